@@ -1,0 +1,1 @@
+"""What runs when: jobs, run folders, stages, the command line."""

@@ -1,0 +1,122 @@
+"""The job: what a YAML file may say, as a strict schema. ``docs/jobs.md`` is generated from it."""
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from renderer.settings import UNBOUNDED_DEPTH
+
+MAX_PIXELS_ACROSS = 65535
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+
+Pixels = Annotated[int, Field(ge=1, le=MAX_PIXELS_ACROSS)]
+
+
+class Section(BaseModel):
+    """A section of a job: unknown keys are errors, and no value is converted silently."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Render(Section):
+    """How light is simulated. A key that is left out takes the value that the scene's film, sampler and integrator ask for."""
+
+    method: Literal["path", "light"] | None = Field(
+        default=None, description="The estimator: `path` traces walks from the camera, `light` from the emitters."
+    )
+    resolution: Annotated[tuple[Pixels, Pixels], Field(strict=False)] | None = Field(
+        default=None, description="Width and height of the film, in pixels."
+    )
+    samples: int | None = Field(
+        default=None, ge=1, le=2**31, description="Walks for each pixel (for `light`: as many light walks as there are pixels, so many times)."
+    )
+    max_depth: int | None = Field(
+        default=None,
+        ge=-1,
+        le=UNBOUNDED_DEPTH,
+        description="Longest path, in segments (Mitsuba's meaning: 1 is emitters alone, 2 adds direct light); -1 is unbounded, up to 255.",
+    )
+    rr_depth: int | None = Field(default=None, ge=1, le=2**16 - 1, description="Depth from which on Russian roulette may end a walk, in segments.")
+    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of all random numbers: the same job and seed give the same bits.")
+    sampler: Literal["independent", "sobol"] = Field(
+        default="sobol", description="`sobol` (Owen-scrambled points, less noise) or `independent` random numbers."
+    )
+    replicates: int = Field(
+        default=4, ge=1, le=1024, description="Independent scramblings that Sobol passes take in turn, so that standard errors can be computed."
+    )
+    filter: Literal["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"] | None = Field(
+        default=None, description="Reconstruction filter of the film."
+    )
+
+    @field_validator("max_depth")
+    @classmethod
+    def _no_zero_depth(cls, value: int | None) -> int | None:
+        if value == 0:
+            raise ValueError("a path has at least one segment: give 1 or more, or -1 for no bound")
+        return value
+
+
+class Record(Section):
+    """What is kept of the walks that were traced."""
+
+    keep: Literal["all", "none"] | float = Field(
+        default="all", description="`all` walks, `none`, or the share of walks to record (above 0, at most 1), chosen by a hash of their ids."
+    )
+    columns: list[Literal["primitive", "u", "v"]] = Field(
+        default=[], description="Optional columns of the vertex tables, which rebuild exact shading points."
+    )
+    occluded: bool = Field(default=False, description="Also record connections that were blocked, in the table `occluded`.")
+
+    @field_validator("keep", mode="before")
+    @classmethod
+    def _share(cls, value: Any) -> Any:
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise ValueError("expected `all`, `none`, or a number above 0 and at most 1")
+        if isinstance(value, str):
+            if value not in ("all", "none"):
+                raise ValueError("expected `all`, `none`, or a number above 0 and at most 1")
+            return value
+        if not (math.isfinite(value) and 0 < value <= 1):
+            raise ValueError("expected `all`, `none`, or a number above 0 and at most 1")
+        return float(value)
+
+    @property
+    def share(self) -> float:
+        """The share of walks that is recorded, 0 … 1."""
+        return {"all": 1.0, "none": 0.0}[self.keep] if isinstance(self.keep, str) else self.keep
+
+
+class Images(Section):
+    """How the pictures beside the linear images are made."""
+
+    exposure: float = Field(default=0.0, ge=-64, le=64, description="Exposure of the PNG images, in stops: values are multiplied by 2 to this power.")
+
+
+class Job(Section):
+    """A job file. Paths in it are relative to the file."""
+
+    name: str = Field(min_length=1, max_length=100, pattern=NAME_PATTERN, description="Name of the job, and of its run folder.")
+    scene: str | dict[str, Any] = Field(description="A Mitsuba 3 scene: path of an `.xml` or `.yaml` file, or the dictionary itself.")
+    parameters: dict[str, str | int | float | bool] = Field(default={}, description="Values of the scene's `$parameters`.")
+    render: Render = Field(default=Render(), description="How light is simulated.")
+    record: Record = Field(default=Record(), description="What is kept.")
+    aovs: dict[Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)], Annotated[str, Field(min_length=1, max_length=10_000)]] = Field(
+        default={}, description="Images of some of the light: name -> light path expression, computed from the tables after rendering."
+    )
+    images: Images = Field(default=Images(), description="How pictures are made.")
+    out: str | None = Field(default=None, min_length=1, description="The run folder. Default: `runs/<name>` in the folder where the command is run.")
+
+    @field_validator("scene", mode="before")
+    @classmethod
+    def _scene(cls, value: Any) -> Any:
+        if not isinstance(value, (str, dict)) or not value:
+            raise ValueError("expected the path of a scene file, or a dictionary that describes the scene")
+        return value
+
+    @field_validator("aovs")
+    @classmethod
+    def _no_beauty(cls, value: dict[str, str]) -> dict[str, str]:
+        if "beauty" in value:
+            raise ValueError("`beauty` is the name of the whole image: choose another name")
+        return value

@@ -1,0 +1,75 @@
+"""How large a run will be, from a small pilot trace of walks spread over all of the job."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+
+from pipeline.errors import JobError
+from pipeline.run_folder import RunFolder
+from pipeline.shards import plan_shards
+from renderer.settings import TraceSettings
+from renderer.trace import Tracer
+
+PILOT_WALKS = 4096
+_MARGIN = 1.05  # the pilot's own error, and the headers and padding of files
+
+
+@dataclass(frozen=True)
+class SizeEstimate:
+    """Bytes on disk, by table, and of the shards' films until they are summed."""
+
+    tables: dict[str, int]
+    film: int
+
+    @property
+    def bytes(self) -> int:
+        """All of it, with a margin for the pilot's error."""
+        return int(_MARGIN * sum(self.tables.values())) + self.film
+
+    def text(self) -> str:
+        """The figures, for people."""
+        parts = [f"{name} {human_bytes(size)}" for name, size in {**self.tables, "film": self.film}.items()]
+        return f"{human_bytes(self.bytes)} on disk ({', '.join(parts)})"
+
+
+def estimate_size(tracer: Tracer, settings: TraceSettings) -> SizeEstimate:
+    """Trace a few thousand walks, evenly spread over the job's ids, and scale their rows up."""
+    count = min(PILOT_WALKS, settings.walks)
+    ids = np.unique((np.arange(count, dtype=np.float64) + 0.5) * (settings.walks / count)).astype(np.uint64)
+    measured = dict.fromkeys((name for name in tracer.schemas() if name != "words"), 0)
+
+    def measure(table: str, batch: pa.RecordBatch) -> None:
+        if table in measured:
+            measured[table] += batch.nbytes
+
+    tracer.trace(ids, measure, None)
+    shards = plan_shards(settings.walks)
+    rows = settings.height
+    if settings.method == "path":  # a shard reaches a band of the film, and its filter a little more
+        rows = min(rows, shards[0].count // settings.width + 10)
+    film = len(shards) * rows * settings.width * 4 * 8
+    return SizeEstimate({name: round(size * settings.walks / len(ids)) for name, size in measured.items()}, film)
+
+
+def refuse_too_large(size: SizeEstimate, folder: RunFolder) -> None:
+    """Raise JobError, with the figures, where the run cannot fit on its disk."""
+    free = folder.free_bytes() + folder.used_bytes()
+    if size.bytes > free:
+        raise JobError(
+            f"the run needs about {size.text()}, and {human_bytes(free)} are free at `{folder.path}`: "
+            "lower render.samples or render.resolution, set record.keep to `none` or a fraction, or choose another disk with --out"
+        )
+
+
+def human_bytes(size: float) -> str:
+    """Bytes with a decimal unit.
+
+    >>> human_bytes(1234567)
+    '1.2 MB'
+    """
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    return f"{size:.1f} TB"

@@ -1,0 +1,1 @@
+"""Tables to answers: views, light path expressions, resolved images."""

@@ -1,0 +1,1 @@
+"""The renderer: scene -> tables. It knows nothing of jobs, of DuckDB or of pictures."""

@@ -1,0 +1,1 @@
+"""BSDFs: one file for each family, one contract in ``base``."""

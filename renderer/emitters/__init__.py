@@ -1,0 +1,1 @@
+"""Emitters: one contract in ``base``, one file for each family."""

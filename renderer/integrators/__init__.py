@@ -1,0 +1,1 @@
+"""Estimators: thin compositions of the wavefront's steps."""

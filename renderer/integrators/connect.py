@@ -1,0 +1,40 @@
+"""The step that both tracers share: drop the connections that are blocked, and add the others to their walks."""
+
+import numpy as np
+import numpy.typing as npt
+
+from renderer.integrators.buffers import Lanes, PathRows
+from renderer.integrators.rows import copy_path
+from renderer.kernel import kernel
+
+
+@kernel
+def connect(lanes: Lanes, paths: PathRows, first: int, last: int, blocked: npt.NDArray[np.int32]) -> int:
+    """Keep the rows first … last whose connection is free (``blocked`` is -1), in order; the new number of rows.
+
+    Every row that stays adds its contribution to its walk's radiance.
+    """
+    k = first
+    for i in range(first, last):
+        ray = paths.ray[i]
+        if ray >= 0 and blocked[ray] >= 0:
+            continue
+        lane = paths.lane[i]
+        for c in range(3):
+            lanes.radiance[lane, c] += paths.contribution[i, c]
+        if k != i:
+            copy_path(paths, i, paths, k)
+        k += 1
+    return k
+
+
+@kernel
+def keep_blocked(paths: PathRows, first: int, last: int, blocked: npt.NDArray[np.int32], blocker: npt.NDArray[np.int32], out: PathRows, k: int) -> int:
+    """Copy the rows first … last whose connection is blocked to ``out`` from row k on; ``blocker`` is the first object met."""
+    for i in range(first, last):
+        ray = paths.ray[i]
+        if ray >= 0 and blocked[ray] >= 0:
+            copy_path(paths, i, out, k)
+            out.blocker[k] = blocker[ray]
+            k += 1
+    return k

@@ -1,0 +1,1 @@
+"""Vectors, warps and hashes that kernels share."""

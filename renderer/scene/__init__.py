@@ -1,0 +1,1 @@
+"""Scenes: a Mitsuba 3 description (XML or YAML) compiled into the arrays that kernels read."""

@@ -1,0 +1,1 @@
+"""Shapes as kernels see them."""

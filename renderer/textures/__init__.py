@@ -1,0 +1,1 @@
+"""Textures as kernels see them."""
