@@ -26,8 +26,8 @@ def write_table(folder: RunFolder, name: str, table: pa.Table) -> FileRecord:
         return file.commit(table.num_rows)
 
 
-def write_catalogues(folder: RunFolder, scene: Scene, run: pa.Table, shards: tuple[Shard, ...], recorded: bool) -> dict[str, FileRecord]:
-    """Write every catalogue; ``run`` is the one row that describes the run. Returns what was written, by name."""
+def write_catalogues(folder: RunFolder, scene: Scene, run: pa.Table, words: pa.Table) -> dict[str, FileRecord]:
+    """Write every catalogue; ``run`` is the one row that describes the run, ``words`` the merged words. Returns what was written, by name."""
     tables = {
         "events": events(),
         "techniques": techniques(),
@@ -35,7 +35,7 @@ def write_catalogues(folder: RunFolder, scene: Scene, run: pa.Table, shards: tup
         "emitters": emitters(scene),
         "triangles": triangles(scene),
         "quadrics": quadrics(scene),
-        "words": merged_words(folder, shards) if recorded else _words(np.empty(0, _WORD)),
+        "words": words,
         "run": run,
     }
     return {name: write_table(folder, name, table) for name, table in tables.items()}

@@ -53,7 +53,8 @@ def scene_digest(scene: Scene) -> str:
     """SHA-256, in hexadecimal, of all that the scene gives to kernels and catalogues (not of file names or formatting)."""
     digest = hashlib.sha256()
     _add(digest, scene.arrays)
-    _add(digest, [asdict(item) for item in (*scene.objects, *scene.emitters)])
+    _add(digest, [asdict(item) for item in scene.objects])
+    _add(digest, [asdict(item) for item in scene.emitters])
     _add(digest, (scene.vertices, scene.triangles))
     return digest.hexdigest()
 

@@ -83,6 +83,7 @@ def log_file(path: pathlib.Path) -> Iterator[None]:
     handler = logging.FileHandler(path, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     LOG.addHandler(handler)
+    LOG.setLevel(logging.DEBUG)
     try:
         yield
     finally:
@@ -96,7 +97,7 @@ def log_to_stderr(quiet: bool = False) -> None:
     handler.setFormatter(logging.Formatter("%(message)s"))
     handler.setLevel(logging.WARNING if quiet else logging.INFO)
     LOG.handlers[:] = [handler]
-    LOG.setLevel(logging.INFO)
+    LOG.setLevel(logging.DEBUG)
     LOG.propagate = False
 
 

@@ -174,4 +174,4 @@ class RunFolder:
 
 
 def _digest(value: dict[str, Any]) -> str:
-    return str(xxhash.xxh3_64_hexdigest(json.dumps(value, sort_keys=True)))
+    return str(xxhash.xxh3_64_hexdigest(json.dumps(value, sort_keys=True).encode()))

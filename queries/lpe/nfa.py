@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from queries.errors import ExpressionError
 from queries.lpe.limits import MAX_POSITIONS, Work
-from queries.lpe.syntax import Chain, Choice, Combination, Node, Repeat, Step
+from queries.lpe.syntax import Chain, Choice, Node, Repeat, Step
 
 
 @dataclass
@@ -63,6 +63,7 @@ class _Builder:
 
     def fragment(self, node: Node) -> _Fragment:
         """Where words of a part may begin and end."""
+        self.work.spend(1)
         if isinstance(node, Step):
             return self._symbol(node)
         if isinstance(node, Chain):
@@ -72,15 +73,13 @@ class _Builder:
             return whole
         if isinstance(node, Choice):
             parts = [self.fragment(part) for part in node.parts]
-            self.work.spend(len(parts))
             first = last = 0
             for part in parts:
                 first, last = first | part.first, last | part.last
             return _Fragment(first, last, any(part.nullable for part in parts))
         if isinstance(node, Repeat):
             return self._repeat(node)
-        assert not isinstance(node, Combination)
-        raise AssertionError(node)
+        raise TypeError(f"a {type(node).__name__} has no automaton of its own: combine the automata of its operands")
 
     def _symbol(self, step: Step) -> _Fragment:
         position = len(self.nfa.symbols)
@@ -103,23 +102,20 @@ class _Builder:
         return _Fragment(first, last, left.nullable and right.nullable)
 
     def _repeat(self, node: Repeat) -> _Fragment:
-        """``low`` copies that must come, then a loop, or copies of which each may be left out with those after it."""
-        whole = _NOTHING
-        required = node.low if node.high is not None else max(node.low, 1)
-        last_copy = _NOTHING
-        for _ in range(required):
-            last_copy = self.fragment(node.part)
-            whole = self._then(whole, last_copy)
-        if node.high is None:
-            self._link(last_copy.last, last_copy.first)
-            return _Fragment(whole.first, whole.last, whole.nullable or node.low == 0)
-        ends, reached = whole.last, whole.nullable
-        last = whole.last
-        for _ in range(node.high - node.low):
+        """``low`` copies that must come, then a loop on the last of them, or copies that are nested: p(p(p)?)?."""
+        whole = copy = _NOTHING
+        for _ in range(node.low if node.high is not None else max(node.low, 1)):
             copy = self.fragment(node.part)
-            self._link(last, copy.first)
-            whole = _Fragment(whole.first | copy.first if reached else whole.first, ends, reached)
-            reached = reached and (copy.nullable or whole is whole)
-            last = copy.last | (last if copy.nullable else 0)
+            whole = self._then(whole, copy)
+        if node.high is None:
+            self._link(copy.last, copy.first)
+            return _Fragment(whole.first, whole.last, whole.nullable or node.low == 0)
+        first, ends, before = whole.first, whole.last, whole.last
+        for i in range(node.high - node.low):
+            copy = self.fragment(node.part)
+            self._link(before, copy.first)
+            if i == 0 and whole.nullable:
+                first |= copy.first
             ends |= copy.last
-        return _Fragment(whole.first, ends, whole.nullable or node.low == 0)
+            before = copy.last
+        return _Fragment(first, ends, whole.nullable)

@@ -23,13 +23,15 @@ AREA, PRIMITIVE_FIRST, PRIMITIVE_COUNT, CDF_FIRST, COS_CUTOFF, COS_BEAM, OFFSET 
 
 
 class Environment(NamedTuple):
-    """An environment map on the sphere of directions, with the tables to sample it by luminance times sin theta."""
+    """An environment map with the tables to sample it, made by ``renderer.emitters.envmap.build_environment``.
 
-    pixels: npt.NDArray[np.float32]  # (height, width, 3) radiance
-    row_cdf: npt.NDArray[np.float32]  # (height + 1,)
-    column_cdf: npt.NDArray[np.float32]  # (height, width + 1)
+    Pixels are nodes between which radiance is interpolated; the tables are over the cells that four nodes make.
+    """
+
+    pixels: npt.NDArray[np.float32]  # (height, width, 3) radiance, which Emitters.rgb multiplies
+    row_cdf: npt.NDArray[np.float32]  # (height,) over the height - 1 rows of cells
+    column_cdf: npt.NDArray[np.float32]  # (height - 1, width + 1)
     to_world: npt.NDArray[np.float32]  # (3, 3) rotation
-    average: Any  # float32, the mean that the density is divided by
 
 
 class Emitters(NamedTuple):
@@ -66,12 +68,13 @@ NO_DIRECTION = DirectionSample(np.int32(-1), BLACK, BLACK, ZERO, BLACK, ZERO)
 
 
 class EmissionSample(NamedTuple):
-    """A ray of light that leaves an emitter: where a light walk starts."""
+    """A ray of light that leaves an emitter: where a light walk starts. The choice of the emitter is in its weights."""
 
     emitter: Any  # int32
     point: Vec3  # on the emitter, pushed off its surface (infinite: on a disk outside the scene)
     normal: Vec3  # of the surface; zero where the emitter has none
     d: Vec3  # unit direction of travel
     radiance: Vec3  # Le over the positional density (area: per squared unit; delta position: intensity), so that a
-    # connection to the lens multiplies it by the emitter's cosine (area) and the geometry
+    # connection to the lens multiplies it by the emitter's cosine (area) or falloff (spot); black where the emitter is
+    # infinite or directional: no connection can find its ray. ``dispatch.emission_toward`` does this
     weight: Vec3  # power carried: Le cos / (positional density * directional density)

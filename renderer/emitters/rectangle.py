@@ -6,13 +6,13 @@ import numpy.typing as npt
 from renderer.emitters.base import AREA, NO_DIRECTION, DirectionSample, Emitters
 from renderer.kernel import kernel
 from renderer.math.vec import ONE, ZERO, Vec3, dot, madd, scale, sub
-from renderer.shapes.base import Geometry
+from renderer.shapes.base import Geometry, Index
 from renderer.textures.base import Textures
 from renderer.textures.lookup import texture_rgb
 
 
 @kernel
-def frame_vec(frame: npt.NDArray[np.float32], emitter: int, first: int) -> Vec3:
+def frame_vec(frame: npt.NDArray[np.float32], emitter: Index, first: int) -> Vec3:
     """Three consecutive numbers of an emitter's frame: (12,) = corner, edge, edge, unit normal of a rectangle."""
     return (frame[emitter, first], frame[emitter, first + 1], frame[emitter, first + 2])
 
@@ -33,7 +33,7 @@ def pdf_area(distance: np.float32, cos_light: np.float32, density: np.float32) -
 
 @kernel
 def area_direction(
-    emitter: int, p: Vec3, point: Vec3, normal: Vec3, offset: np.float32, radiance: Vec3, density: np.float32
+    emitter: Index, p: Vec3, point: Vec3, normal: Vec3, offset: np.float32, radiance: Vec3, density: np.float32
 ) -> DirectionSample:
     """The direction from ``p`` to a light point that was sampled with ``density`` per squared unit (choice of the emitter included)."""
     to_light = sub(point, p)
@@ -49,7 +49,7 @@ def area_direction(
 
 
 @kernel
-def rectangle_point(emitters: Emitters, geometry: Geometry, emitter: int, u: np.float32, v: np.float32) -> tuple[Vec3, Vec3, np.float32]:
+def rectangle_point(emitters: Emitters, geometry: Geometry, emitter: Index, u: np.float32, v: np.float32) -> tuple[Vec3, Vec3, np.float32]:
     """The point (u, v) of a rectangle, its unit normal and its error-bound offset."""
     corner = frame_vec(emitters.frame, emitter, 0)
     point = madd(frame_vec(emitters.frame, emitter, 3), u, madd(frame_vec(emitters.frame, emitter, 6), v, corner))
@@ -60,7 +60,7 @@ def rectangle_point(emitters: Emitters, geometry: Geometry, emitter: int, u: np.
 
 @kernel
 def sample_rectangle(
-    emitters: Emitters, geometry: Geometry, textures: Textures | None, emitter: int, p: Vec3, u: np.float32, v: np.float32, select: np.float32
+    emitters: Emitters, geometry: Geometry, textures: Textures | None, emitter: Index, p: Vec3, u: np.float32, v: np.float32, select: np.float32
 ) -> DirectionSample:
     """Light from a uniform point of the rectangle toward ``p``; ``select`` is the probability of choosing the emitter."""
     point, normal, offset = rectangle_point(emitters, geometry, emitter, u, v)

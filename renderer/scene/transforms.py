@@ -24,9 +24,13 @@ def rotate(axis: Sequence[float], angle: float) -> F64:
     """Turn around an axis through the origin by an angle in degrees, counter-clockwise seen against the axis."""
     x, y, z = np.asarray(axis, np.float64) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    theta = np.deg2rad(angle)
+    quarter = round(angle / 90)
+    if angle == quarter * 90:  # exact, so that what lies in a plane stays in it
+        sine, cosine = ((0, 1), (1, 0), (0, -1), (-1, 0))[quarter % 4]
+    else:
+        sine, cosine = np.sin(np.deg2rad(angle)), np.cos(np.deg2rad(angle))
     m = np.eye(4)
-    m[:3, :3] += np.sin(theta) * cross + (1 - np.cos(theta)) * cross @ cross
+    m[:3, :3] += sine * cross + (1 - cosine) * cross @ cross
     return m
 
 

@@ -77,7 +77,7 @@ def sample_ray(sensor: Sensor, x: np.float32, y: np.float32, u: np.float32, v: n
 def clip_distance(sensor: Sensor, d: Vec3) -> np.float32:
     """How far along unit ``d`` a camera ray reaches from the near to the far clipping plane."""
     cos_theta = sensor.to_world[0, 2] * d[0] + sensor.to_world[1, 2] * d[1] + sensor.to_world[2, 2] * d[2]
-    return (sensor.far - sensor.near) / cos_theta
+    return np.float32((sensor.far - sensor.near) / cos_theta)
 
 
 @kernel

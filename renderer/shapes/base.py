@@ -9,6 +9,8 @@ from renderer.math.vec import Vec3
 
 SPHERE, DISK, CYLINDER = range(3)
 
+Index = int | np.integer[Any]  # a row of an array: an int in Python, any integer type in kernels
+
 
 class Quadrics(NamedTuple):
     """Exact spheres, disks and cylinders in their local frames (unit shapes, Mitsuba's parametrization); ``nq`` rows."""

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from renderer.kernel import kernel
 from renderer.math.vec import ONE, Vec3, cross, dot, madd, scale
-from renderer.shapes.base import CYLINDER, DISK, SPHERE, Geometry, Hit, Quadrics
+from renderer.shapes.base import CYLINDER, DISK, SPHERE, Geometry, Hit, Index, Quadrics
 
-Vec3d = tuple[np.float64, np.float64, np.float64]
+Vec3d = tuple[float, float, float]  # float64
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 TWO_PI_D = 2 * np.pi
@@ -23,7 +23,7 @@ PI_D = np.pi
 
 
 @kernel
-def transform_point(m: npt.NDArray[np.float64], i: int, p: Vec3) -> Vec3d:
+def transform_point(m: npt.NDArray[np.float64], i: Index, p: Vec3 | Vec3d) -> Vec3d:
     """Matrix i of (n, 3, 4) float64 times the point p."""
     return (
         m[i, 0, 0] * p[0] + m[i, 0, 1] * p[1] + m[i, 0, 2] * p[2] + m[i, 0, 3],
@@ -33,7 +33,7 @@ def transform_point(m: npt.NDArray[np.float64], i: int, p: Vec3) -> Vec3d:
 
 
 @kernel
-def transform_vector(m: npt.NDArray[np.float64], i: int, a: Vec3) -> Vec3d:
+def transform_vector(m: npt.NDArray[np.float64], i: Index, a: Vec3 | Vec3d) -> Vec3d:
     """The linear part of matrix i of (n, 3, 4) float64 times the vector a."""
     return (
         m[i, 0, 0] * a[0] + m[i, 0, 1] * a[1] + m[i, 0, 2] * a[2],
@@ -43,7 +43,7 @@ def transform_vector(m: npt.NDArray[np.float64], i: int, a: Vec3) -> Vec3d:
 
 
 @kernel
-def transform_normal(inverse: npt.NDArray[np.float64], i: int, n: Vec3) -> Vec3d:
+def transform_normal(inverse: npt.NDArray[np.float64], i: Index, n: Vec3 | Vec3d) -> Vec3d:
     """The transposed linear part of matrix i of (n, 3, 4) times n: a normal under the inverse of that matrix."""
     return (
         inverse[i, 0, 0] * n[0] + inverse[i, 1, 0] * n[1] + inverse[i, 2, 0] * n[2],
@@ -66,7 +66,7 @@ def unit_float32(a: Vec3d) -> Vec3:
 
 
 @kernel
-def chord(a: np.float64, b: np.float64, c: np.float64) -> tuple[np.float64, np.float64]:
+def chord(a: float, b: float, c: float) -> tuple[float, float]:
     """Both parameters t where |o + t d|² = 1, with a = d·d, b = o·d, c = |the point of the line nearest to 0|².
 
     Taking the nearest point first avoids the cancellation of the textbook discriminant (haines2019). No hit: (inf, -inf).
@@ -79,7 +79,7 @@ def chord(a: np.float64, b: np.float64, c: np.float64) -> tuple[np.float64, np.f
 
 
 @kernel
-def intersect_sphere(o: Vec3d, d: Vec3d) -> np.float64:
+def intersect_sphere(o: Vec3d, d: Vec3d) -> float:
     """The first t > 0 where a local ray meets the unit sphere; inf if none."""
     a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
     b = o[0] * d[0] + o[1] * d[1] + o[2] * d[2]
@@ -94,7 +94,7 @@ def intersect_sphere(o: Vec3d, d: Vec3d) -> np.float64:
 
 
 @kernel
-def intersect_cylinder(o: Vec3d, d: Vec3d) -> np.float64:
+def intersect_cylinder(o: Vec3d, d: Vec3d) -> float:
     """The first t > 0 where a local ray meets the open cylinder of radius 1 over z in [0, 1]; inf if none."""
     a = d[0] * d[0] + d[1] * d[1]
     b = o[0] * d[0] + o[1] * d[1]
@@ -114,7 +114,7 @@ def intersect_cylinder(o: Vec3d, d: Vec3d) -> np.float64:
 
 
 @kernel
-def intersect_disk(o: Vec3d, d: Vec3d) -> np.float64:
+def intersect_disk(o: Vec3d, d: Vec3d) -> float:
     """The t > 0 where a local ray meets the unit disk in the plane z = 0; inf if none."""
     t = -o[2] / d[2]
     x = o[0] + t * d[0]
@@ -125,7 +125,7 @@ def intersect_disk(o: Vec3d, d: Vec3d) -> np.float64:
 
 
 @kernel
-def intersect_quadric(quadrics: Quadrics, row: int, o: Vec3, d: Vec3) -> np.float64:
+def intersect_quadric(quadrics: Quadrics, row: Index, o: Vec3, d: Vec3) -> float:
     """The first t > 0, in units of d, where a world ray meets quadric ``row``; inf if none."""
     local_o = transform_point(quadrics.to_object, row, o)
     local_d = transform_vector(quadrics.to_object, row, d)
@@ -138,7 +138,7 @@ def intersect_quadric(quadrics: Quadrics, row: int, o: Vec3, d: Vec3) -> np.floa
 
 
 @kernel
-def intersect_quadrics(quadrics: Quadrics, nt: int, o: F32, d: F32, t: F32, primitive: I32, n: int) -> None:
+def intersect_quadrics(quadrics: Quadrics, nt: Index, o: F32, d: F32, t: F32, primitive: I32, n: int) -> None:
     """Closest hits of the first n rays, o and d (n, 3) float32: lower ``t`` (n,) and set ``primitive`` (n,) to nt + row."""
     rows = quadrics.kind.shape[0]
     for i in range(n):
@@ -152,7 +152,7 @@ def intersect_quadrics(quadrics: Quadrics, nt: int, o: F32, d: F32, t: F32, prim
 
 
 @kernel
-def occluded_quadrics(quadrics: Quadrics, nt: int, o: F32, d: F32, tfar: F32, blocked: I32, n: int) -> None:
+def occluded_quadrics(quadrics: Quadrics, nt: Index, o: F32, d: F32, tfar: F32, blocked: I32, n: int) -> None:
     """Shadow rays: ``blocked`` (n,) int32, as embree leaves it (0 blocked, -1 free), becomes 0 where t < tfar meets a quadric."""
     rows = quadrics.kind.shape[0]
     for i in range(n):
@@ -160,20 +160,20 @@ def occluded_quadrics(quadrics: Quadrics, nt: int, o: F32, d: F32, tfar: F32, bl
         direction = (d[i, 0], d[i, 1], d[i, 2])
         row = 0
         while row < rows and blocked[i] != 0:
-            if intersect_quadric(quadrics, row, origin, direction) < tfar[i]:
+            if np.float32(intersect_quadric(quadrics, row, origin, direction)) < tfar[i]:
                 blocked[i] = 0
             row += 1
 
 
 @kernel
-def turn(y: np.float64, x: np.float64) -> np.float32:
+def turn(y: float, x: float) -> np.float32:
     """The angle of (x, y) as a share of a full turn, in [0, 1]."""
     share = np.arctan2(y, x) / TWO_PI_D
     return np.float32(share if share >= 0.0 else share + 1.0)
 
 
 @kernel
-def parameters_of(kind: int, local: Vec3d) -> tuple[np.float32, np.float32]:
+def parameters_of(kind: Index, local: Vec3d) -> tuple[np.float32, np.float32]:
     """(u, v) of a point on, or near, a unit shape."""
     x, y, z = local
     radius = np.sqrt(x * x + y * y)
@@ -185,7 +185,7 @@ def parameters_of(kind: int, local: Vec3d) -> tuple[np.float32, np.float32]:
 
 
 @kernel
-def quadric_parameters(quadrics: Quadrics, row: int, o: Vec3, d: Vec3, t: np.float32) -> tuple[np.float32, np.float32]:
+def quadric_parameters(quadrics: Quadrics, row: Index, o: Vec3, d: Vec3, t: np.float32) -> tuple[np.float32, np.float32]:
     """(u, v) of quadric ``row`` where the world ray meets it at t."""
     local_o = transform_point(quadrics.to_object, row, o)
     local_d = transform_vector(quadrics.to_object, row, d)
@@ -196,7 +196,7 @@ def quadric_parameters(quadrics: Quadrics, row: int, o: Vec3, d: Vec3, t: np.flo
 
 
 @kernel
-def local_frame(kind: int, u: np.float32, v: np.float32) -> tuple[Vec3d, Vec3d, Vec3d]:
+def local_frame(kind: Index, u: np.float32, v: np.float32) -> tuple[Vec3d, Vec3d, Vec3d]:
     """Point, outward normal (disk: +z) and dp/du up to scale of a unit shape at (u, v)."""
     phi = TWO_PI_D * (v if kind == DISK else u)
     c = np.cos(phi)
@@ -207,12 +207,12 @@ def local_frame(kind: int, u: np.float32, v: np.float32) -> tuple[Vec3d, Vec3d, 
         point = (c * sin_theta, s * sin_theta, cos_theta)
         return point, point, (-s, c, 0.0)
     if kind == CYLINDER:
-        return (c, s, np.float64(v)), (c, s, 0.0), (-s, c, 0.0)
+        return (c, s, float(v)), (c, s, 0.0), (-s, c, 0.0)
     return (u * c, u * s, 0.0), (0.0, 0.0, 1.0), (c, s, 0.0)
 
 
 @kernel
-def quadric_hit(quadrics: Quadrics, geometry: Geometry, primitive: int, u: np.float32, v: np.float32) -> Hit:
+def quadric_hit(quadrics: Quadrics, geometry: Geometry, primitive: Index, u: np.float32, v: np.float32) -> Hit:
     """The point (u, v) of the quadric with id ``primitive``, and its frame; the tangent s is along dp/du."""
     row = primitive - geometry.p0.shape[0]
     point, normal, dp_du = local_frame(quadrics.kind[row], u, v)

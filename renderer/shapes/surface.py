@@ -10,9 +10,8 @@ import numpy.typing as npt
 
 from renderer.kernel import kernel
 from renderer.math.vec import ONE, ZERO, Vec3, cross, dot, madd, row, scale, sub, tangents
-from renderer.shapes.base import Geometry, Hit, Quadrics
+from renderer.shapes.base import Geometry, Hit, Index, Quadrics
 from renderer.shapes.quadrics import quadric_hit, quadric_parameters
-
 
 
 @kernel
@@ -24,7 +23,7 @@ def clamp_barycentrics(b1: np.float32, b2: np.float32) -> tuple[np.float32, np.f
 
 
 @kernel
-def barycentrics(geometry: Geometry, primitive: int, o: Vec3, d: Vec3) -> tuple[np.float32, np.float32]:
+def barycentrics(geometry: Geometry, primitive: Index, o: Vec3, d: Vec3) -> tuple[np.float32, np.float32]:
     """Barycentric weights of corners 2 and 3 where the ray's line crosses a triangle's plane, clamped (moller1997)."""
     e1 = row(geometry.e1, primitive)
     e2 = row(geometry.e2, primitive)
@@ -35,7 +34,7 @@ def barycentrics(geometry: Geometry, primitive: int, o: Vec3, d: Vec3) -> tuple[
 
 
 @kernel
-def shading_normal(normals: npt.NDArray[np.float32] | None, primitive: int, b1: np.float32, b2: np.float32, ng: Vec3) -> Vec3:
+def shading_normal(normals: npt.NDArray[np.float32] | None, primitive: Index, b1: np.float32, b2: np.float32, ng: Vec3) -> Vec3:
     """The interpolated unit normal of a triangle; ``ng`` where the scene has no vertex normals."""
     if normals is None:
         return ng
@@ -53,7 +52,7 @@ def shading_normal(normals: npt.NDArray[np.float32] | None, primitive: int, b1: 
 
 @kernel
 def texture_coordinates(
-    uvs: npt.NDArray[np.float32] | None, primitive: int, b1: np.float32, b2: np.float32
+    uvs: npt.NDArray[np.float32] | None, primitive: Index, b1: np.float32, b2: np.float32
 ) -> tuple[np.float32, np.float32]:
     """(u, v) at a triangle's barycentric weights; the weights themselves where the scene has no texture coordinates."""
     if uvs is None:
@@ -77,7 +76,7 @@ def frame_along(n: Vec3, dp_du: Vec3) -> tuple[Vec3, Vec3]:
 
 
 @kernel
-def triangle_frame(uvs: npt.NDArray[np.float32] | None, primitive: int, e1: Vec3, e2: Vec3, n: Vec3) -> tuple[Vec3, Vec3]:
+def triangle_frame(uvs: npt.NDArray[np.float32] | None, primitive: Index, e1: Vec3, e2: Vec3, n: Vec3) -> tuple[Vec3, Vec3]:
     """Unit tangents of a triangle's shading frame, along dp/du where the scene has texture coordinates."""
     if uvs is None:
         return tangents(n)
@@ -92,7 +91,7 @@ def triangle_frame(uvs: npt.NDArray[np.float32] | None, primitive: int, e1: Vec3
 
 
 @kernel
-def triangle_at(geometry: Geometry, primitive: int, b1: np.float32, b2: np.float32) -> Hit:
+def triangle_at(geometry: Geometry, primitive: Index, b1: np.float32, b2: np.float32) -> Hit:
     """The point of a triangle with these barycentric weights of corners 2 and 3, and its frame."""
     e1 = row(geometry.e1, primitive)
     e2 = row(geometry.e2, primitive)
@@ -105,7 +104,7 @@ def triangle_at(geometry: Geometry, primitive: int, b1: np.float32, b2: np.float
 
 
 @kernel
-def parameters(quadrics: Quadrics | None, geometry: Geometry, primitive: int, o: Vec3, d: Vec3, t: np.float32) -> tuple[np.float32, np.float32]:
+def parameters(quadrics: Quadrics | None, geometry: Geometry, primitive: Index, o: Vec3, d: Vec3, t: np.float32) -> tuple[np.float32, np.float32]:
     """The recorded parameters of the point where a ray met ``primitive``."""
     if quadrics is None:
         return barycentrics(geometry, primitive, o, d)
@@ -115,7 +114,7 @@ def parameters(quadrics: Quadrics | None, geometry: Geometry, primitive: int, o:
 
 
 @kernel
-def point_at(quadrics: Quadrics | None, geometry: Geometry, primitive: int, b1: np.float32, b2: np.float32) -> Hit:
+def point_at(quadrics: Quadrics | None, geometry: Geometry, primitive: Index, b1: np.float32, b2: np.float32) -> Hit:
     """The point of a primitive, triangle or quadric, with these parameters."""
     if quadrics is None:
         return triangle_at(geometry, primitive, b1, b2)
@@ -125,14 +124,14 @@ def point_at(quadrics: Quadrics | None, geometry: Geometry, primitive: int, b1: 
 
 
 @kernel
-def surface(geometry: Geometry, primitive: int, o: Vec3, d: Vec3, t: np.float32) -> Hit:
+def surface(geometry: Geometry, primitive: Index, o: Vec3, d: Vec3, t: np.float32) -> Hit:
     """What the ray (o, d) met on ``primitive`` at parameter ``t``."""
     b1, b2 = parameters(geometry.quadrics, geometry, primitive, o, d, t)
     return point_at(geometry.quadrics, geometry, primitive, b1, b2)
 
 
 @kernel
-def surface_at(geometry: Geometry, primitive: int, b1: np.float32, b2: np.float32) -> Hit:
+def surface_at(geometry: Geometry, primitive: Index, b1: np.float32, b2: np.float32) -> Hit:
     """The point with the recorded parameters of a primitive: the same, bit for bit, as ``surface`` gave."""
     return point_at(geometry.quadrics, geometry, primitive, b1, b2)
 

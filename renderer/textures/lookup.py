@@ -3,15 +3,19 @@
 Row 0 of a bitmap, its top, lies at v = 0, and pixel (x, y) has its center at ((x + 1/2) / width, (y + 1/2) / height).
 """
 
+from typing import Any
+
 import numpy as np
 
 from renderer.kernel import kernel
 from renderer.math.vec import HALF, ONE, Vec3, madd, scale
 from renderer.textures.base import BITMAP, MIRROR, NEAREST, REPEAT, Textures
 
+Index = int | np.integer[Any]
+
 
 @kernel
-def wrap(i: int, size: int, mode: int) -> int:
+def wrap(i: int, size: int, mode: Index) -> int:
     """A pixel coordinate brought into 0 … size - 1."""
     if mode == REPEAT:
         return i % size
@@ -22,29 +26,29 @@ def wrap(i: int, size: int, mode: int) -> int:
 
 
 @kernel
-def pixel(textures: Textures, index: int, x: int, y: int) -> Vec3:
+def pixel(textures: Textures, index: Index, x: int, y: int) -> Vec3:
     """The pixel (x, y) of a bitmap, wrapped."""
     mode = textures.mode[index, 1]
-    width = np.int64(textures.size[index, 0])
-    i = textures.first[index] + wrap(y, np.int64(textures.size[index, 1]), mode) * width + wrap(x, width, mode)
+    width = int(textures.size[index, 0])
+    i = textures.first[index] + wrap(y, int(textures.size[index, 1]), mode) * width + wrap(x, width, mode)
     return (textures.pixels[i, 0], textures.pixels[i, 1], textures.pixels[i, 2])
 
 
 @kernel
-def bitmap(textures: Textures, index: int, u: np.float32, v: np.float32) -> Vec3:
+def bitmap(textures: Textures, index: Index, u: np.float32, v: np.float32) -> Vec3:
     """The color of a bitmap, the nearest pixel's or interpolated between four."""
     x = u * np.float32(textures.size[index, 0])
     y = v * np.float32(textures.size[index, 1])
     if textures.mode[index, 0] == NEAREST:
-        return pixel(textures, index, np.int64(np.floor(x)), np.int64(np.floor(y)))
+        return pixel(textures, index, int(np.floor(x)), int(np.floor(y)))
 
     # Bilinear: the four pixels whose centers surround the point
     x = x - HALF
     y = y - HALF
     floor_x = np.floor(x)
     floor_y = np.floor(y)
-    i = np.int64(floor_x)
-    j = np.int64(floor_y)
+    i = int(floor_x)
+    j = int(floor_y)
     fx = np.float32(x - floor_x)
     fy = np.float32(y - floor_y)
     top = madd(pixel(textures, index, i + 1, j), fx, scale(pixel(textures, index, i, j), ONE - fx))
@@ -53,7 +57,7 @@ def bitmap(textures: Textures, index: int, u: np.float32, v: np.float32) -> Vec3
 
 
 @kernel
-def checkerboard(textures: Textures, index: int, u: np.float32, v: np.float32) -> Vec3:
+def checkerboard(textures: Textures, index: Index, u: np.float32, v: np.float32) -> Vec3:
     """The first color where both coordinates lie in the same half of their unit cell, else the second."""
     odd = ((u - np.floor(u)) > HALF) != ((v - np.floor(v)) > HALF)
     c = 1 if odd else 0
@@ -61,7 +65,7 @@ def checkerboard(textures: Textures, index: int, u: np.float32, v: np.float32) -
 
 
 @kernel
-def texture_rgb(textures: Textures | None, index: int, constant: Vec3, u: np.float32, v: np.float32) -> Vec3:
+def texture_rgb(textures: Textures | None, index: Index, constant: Vec3, u: np.float32, v: np.float32) -> Vec3:
     """The color of texture ``index`` at (u, v), or ``constant`` where the scene or the index (-1) has no texture."""
     if textures is None:
         return constant

@@ -1,0 +1,270 @@
+"""A run, stage by stage: compile the scene, trace, sum the film, write catalogues and images, compute the AOVs."""
+
+import contextlib
+import os
+import pathlib
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipeline import catalogues, film_sum, images
+from pipeline.errors import JobError, RunFolderError
+from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large
+from pipeline.executor import render_shards
+from pipeline.files import FileRecord, checksum, clear_errors
+from pipeline.identity import camera, differences, renderer_version, settings_as_json, versions
+from pipeline.prepare import PreparedJob, prepare_job
+from pipeline.progress import LOG, log_file, progress
+from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
+from pipeline.shards import Shard, plan_shards, shard_size
+from renderer.accelerators import Accelerators
+from renderer.film import Film
+from renderer.trace import Tracer
+
+
+@dataclass
+class Stopwatch:
+    """Seconds of each stage, by name."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextlib.contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage, also where it fails."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+def default_threads() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def validate_job(path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib.Path | None = None) -> tuple[PreparedJob, SizeEstimate]:
+    """Check a job as ``run`` would, and estimate its size; nothing is written. Raises JobError and SceneError."""
+    prepared = prepare_job(path, overrides)
+    size = estimate_size(Tracer(prepared.scene, prepared.settings), prepared.settings)
+    refuse_too_large(size, RunFolder(prepared.loaded.run_folder(out)))
+    return prepared, size
+
+
+def run_job(
+    path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib.Path | None = None, resume: bool = False, threads: int | None = None
+) -> RunFolder:
+    """Run a job into its folder, or go on with it. Raises JobError, SceneError, RunFolderError or Interrupted."""
+    watch = Stopwatch()
+    with watch.stage("scene"):
+        prepared = prepare_job(path, overrides)
+    folder = RunFolder(prepared.loaded.run_folder(out))
+    with folder.locked(), clear_errors("running the job", folder.path), log_file(folder.path / "log.txt"):
+        try:
+            Run(prepared, folder, watch, threads or default_threads(), resume).go()
+        except BaseException as error:
+            LOG.debug("stopped: %s", error)
+            raise
+    return folder
+
+
+class Run:
+    """One run of a prepared job into a locked folder."""
+
+    def __init__(self, prepared: PreparedJob, folder: RunFolder, watch: Stopwatch, threads: int, resume: bool) -> None:
+        self.prepared, self.folder, self.watch, self.threads = prepared, folder, watch, threads
+        self.job, self.settings, self.scene = prepared.loaded.job, prepared.settings, prepared.scene
+        self.shards = plan_shards(self.settings.walks)
+        self.film = Film(self.settings.width, self.settings.height, self.settings.filter)
+        self.manifest = self._manifest(self._same_run(resume))
+
+    def go(self) -> None:
+        """All stages, in order."""
+        summed = film_sum.load_film(self.folder, self.film, _record(self.manifest["film"]))
+        with self.watch.stage("verify"):
+            missing = self._missing_shards(film_needed=not summed)
+        if missing:
+            self._render(missing)
+        with self.watch.stage("images"):
+            if not summed:
+                self.manifest["film"] = film_sum.sum_films(self.folder, self.shards, self.film).as_json()
+            self._write_image("beauty", self.film.image(self.settings.method, self.settings.passes), None)
+        with self.watch.stage("catalogues"):
+            self._write_catalogues()
+        self.manifest["status"] = COMPLETE
+        self._save()
+        film_sum.drop_films(self.folder, self.shards)
+        with self.watch.stage("aovs"):
+            self._write_aovs()
+        self._save()
+        LOG.info("done: %s", self.folder.path)
+
+    # --- which run this is ----------------------------------------------------------------------------------------
+
+    def _same_run(self, resume: bool) -> dict[str, Any]:
+        """The manifest of the run to go on with, empty for a new one; refuses folders of other runs."""
+        old = self.folder.manifest()
+        if old is None:
+            return {}
+        different = differences(old.get("fingerprint", {}), self.prepared.fingerprint)
+        if different:
+            raise JobError(f"`{self.folder.path}` holds a run of another job ({different}): choose another folder with --out")
+        if not resume:
+            state = "complete" if old.get("status") == COMPLETE else "unfinished"
+            raise JobError(
+                f"`{self.folder.path}` holds this job's run already, {state}: add --resume to go on with it, or choose another folder with --out"
+            )
+        return old
+
+    def _manifest(self, old: dict[str, Any]) -> dict[str, Any]:
+        """The manifest as known before rendering."""
+        job = self.prepared.loaded
+        return {
+            "name": self.job.name,
+            "status": RENDERING,
+            "job": self.job.model_dump(mode="json"),
+            "job_file": str(job.file.absolute()),
+            "fingerprint": self.prepared.fingerprint,
+            "settings": settings_as_json(self.settings),
+            "seed": self.settings.seed,
+            "camera": camera(self.scene),
+            "versions": old.get("versions") or versions(),
+            "warnings": list(self.scene.warnings),
+            "shards": {"count": len(self.shards), "walks": shard_size(self.settings.walks)},
+            "film": old.get("film"),
+            "catalogues": old.get("catalogues", {}),
+            "images": old.get("images", {}),
+            "stats": old.get("stats", {}),
+        }
+
+    # --- rendering ------------------------------------------------------------------------------------------------
+
+    def _missing_shards(self, film_needed: bool) -> list[Shard]:
+        """The shards that must be rendered; those that were whole once are named."""
+        self._save()
+        self.folder.prepare()
+        with ThreadPoolExecutor(self.threads) as pool:
+            found = list(pool.map(lambda shard: self.folder.damage(shard, film_needed), self.shards))
+        missing = [shard for shard, damage in zip(self.shards, found, strict=True) if damage is not None]
+        for shard, damage in zip(self.shards, found, strict=True):
+            if damage:
+                LOG.warning("shard %s is rendered again: %s", shard.name, damage)
+        if len(missing) < len(self.shards):
+            LOG.info("%d of %d shards are there and whole", len(self.shards) - len(missing), len(self.shards))
+        return missing
+
+    def _render(self, missing: list[Shard]) -> None:
+        """Compile kernels, check that the run fits, trace and write what is missing."""
+        self._check_version(len(missing) < len(self.shards))
+        with self.watch.stage("kernels"):
+            accelerators = Accelerators(self.scene)
+            first = Tracer(self.scene, self.settings, accelerators)
+            LOG.info("loading kernels (compiled on the first run, up to a minute) …")
+            first.warm_up()
+        with self.watch.stage("estimate"):
+            size = estimate_size(first, self.settings)
+            LOG.info("%d walks, about %s", self.settings.walks, size.text())
+            refuse_too_large(size, self.folder)
+        threads = max(1, min(self.threads, len(missing)))
+        tracers: list[Callable[[], Tracer]] = [lambda: first]
+        tracers += [lambda: Tracer(self.scene, self.settings, accelerators)] * (threads - 1)
+        walks = sum(shard.count for shard in missing)
+        seconds = self.watch.seconds.get("render", 0.0)
+        try:
+            with self.watch.stage("render"), progress("tracing", walks, "samples") as bar:
+                render_shards(self.folder, missing, self.settings, tracers, bar)
+        finally:
+            self._add_render_stats(walks if sys.exc_info()[0] is None else bar.done, self.watch.seconds["render"] - seconds)
+            self._save()
+        LOG.info("traced %d walks in %.1f s", walks, self.watch.seconds["render"] - seconds)
+
+    def _check_version(self, going_on: bool) -> None:
+        """Shards of two versions of the renderer must not be mixed."""
+        here, there = renderer_version(), self.manifest["versions"].get("renderer")
+        if going_on and here != there:
+            raise RunFolderError(
+                f"`{self.folder.path}` was begun by another version of the renderer ({there}, this is {here}), whose numbers may differ "
+                "in their last bits: go on with that version, or choose another folder with --out"
+            )
+        self.manifest["versions"] = versions()
+
+    def _add_render_stats(self, walks: int, seconds: float) -> None:
+        stats = self.manifest["stats"]
+        stats["rendered_walks"] = stats.get("rendered_walks", 0) + walks
+        stats["render_seconds"] = stats.get("render_seconds", 0.0) + seconds
+        stats["samples_per_second"] = stats["rendered_walks"] / max(stats["render_seconds"], 1e-9)
+        stats["threads"] = self.threads
+
+    # --- what is made of it ---------------------------------------------------------------------------------------
+
+    def _write_catalogues(self) -> None:
+        """Sum the shards' counts, then write the small tables."""
+        rows: dict[str, int] = {}
+        size = 0
+        for shard in self.shards:
+            record = self.folder.read_shard(shard)
+            if record is None:
+                raise RunFolderError(f"shard {shard.name} vanished from `{self.folder.path}`: run again with --resume")
+            for key, value in record["counts"].items():
+                rows[key] = rows.get(key, 0) + value
+            size += sum(file["bytes"] for name, file in record["files"].items() if name.startswith("tables/"))
+        counts = {table: rows.get(f"{table}_rows", 0) for table in ("camera_vertices", "light_vertices", "paths", "occluded")}
+        words = catalogues.merged_words(self.folder, self.shards if self.settings.keep > 0 else ())
+        run = catalogues.run_row(self.job.name, self.settings, self.scene, self.manifest["versions"], {**counts, "words": words.num_rows})
+        written = catalogues.write_catalogues(self.folder, self.scene, run, words)
+        self.manifest["catalogues"] = {name: record.as_json() for name, record in written.items()}
+        self.manifest["rows"] = {**counts, "words": words.num_rows}
+        self.manifest["stats"] |= {"vertices": rows["vertices"], "paths": rows["paths"], "bytes": size}
+
+    def _write_aovs(self) -> None:
+        """Resolve every AOV from the tables; images of expressions that are gone are left alone."""
+        if not self.job.aovs:
+            return
+        from queries.images import aov_image
+
+        with progress("AOVs", len(self.job.aovs), "images") as bar:
+            for name, expression in self.job.aovs.items():
+                if not self._has_image(name, expression):
+                    self._write_image(name, aov_image(self.folder.path, expression), expression)
+                bar.advance(1)
+
+    def _has_image(self, name: str, expression: str) -> bool:
+        """Whether the AOV was computed before, from the same expression."""
+        known = self.manifest["images"].get(name, {})
+        try:
+            same = known["exposure"] == self.job.images.exposure and known["expression"] == expression
+            return same and checksum(self.folder.image(name, "exr")) == (known["exr"]["bytes"], known["exr"]["xxh3"])
+        except (KeyError, OSError):
+            return False
+
+    def _write_image(self, name: str, image: images.F32, expression: str | None) -> None:
+        """Write one image in both kinds, and note its checksums."""
+        settings, job = self.settings, self.job
+        metadata = {
+            "job": job.name,
+            "image": name,
+            "expression": expression or "",
+            "method": settings.method,
+            "seed": str(settings.seed),
+            "samples": str(settings.passes),
+            "max_depth": str(settings.max_depth),
+            "version": self.manifest["versions"]["pathspace"],
+        }
+        images.write_exr(self.folder.image(name, "exr"), image, metadata)
+        images.write_png(self.folder.image(name, "png"), image, job.images.exposure)
+        files = {kind: FileRecord(0, *checksum(self.folder.image(name, kind))).as_json() for kind in ("exr", "png")}
+        self.manifest["images"][name] = {"expression": expression, "exposure": job.images.exposure, **files}
+
+    def _save(self) -> None:
+        """Write the manifest with what is known by now."""
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+        self.manifest["stats"] |= {"peak_rss_bytes": peak, "stages": {name: round(s, 4) for name, s in self.watch.seconds.items()}}
+        self.folder.write_manifest(self.manifest)
+
+
+def _record(value: dict[str, Any] | None) -> FileRecord | None:
+    return None if value is None else FileRecord(**value)

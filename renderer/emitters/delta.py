@@ -1,0 +1,79 @@
+"""Point, spot and directional lights: a single position or direction, so no ray can meet them."""
+
+import numpy as np
+
+from renderer.emitters.base import COS_BEAM, COS_CUTOFF, DIRECTIONAL, NO_DIRECTION, SPOT, DirectionSample, Emitters
+from renderer.kernel import kernel
+from renderer.math.vec import BLACK, ONE, TWO_PI, ZERO, Vec3, dot, neg, row, scale, sub, tangents, to_world
+from renderer.math.warp import sample_sphere
+from renderer.shapes.base import Index
+
+FOUR_PI = np.float32(4 * np.pi)
+BEYOND = np.float32(4.0)  # radii of the scene: farther than any two of its points are apart
+
+
+@kernel
+def position(emitters: Emitters, emitter: Index) -> Vec3:
+    """Where a point or spot light stands: the last column of its matrix."""
+    return (emitters.frame[emitter, 3], emitters.frame[emitter, 7], emitters.frame[emitter, 11])
+
+
+@kernel
+def axis(emitters: Emitters, emitter: Index) -> Vec3:
+    """The unit direction of travel of a directional light, or along a spot light's axis: the third column of its matrix."""
+    return (emitters.frame[emitter, 2], emitters.frame[emitter, 6], emitters.frame[emitter, 10])
+
+
+@kernel
+def falloff(emitters: Emitters, emitter: Index, d: Vec3) -> np.float32:
+    """The share of a point or spot light's intensity that leaves along unit ``d``.
+
+    A spot's is linear in the angle from its beam's edge to its cutoff, as Mitsuba's.
+    """
+    if emitters.kind[emitter] != SPOT:
+        return ONE
+    cos_theta = min(dot(d, axis(emitters, emitter)), ONE)
+    cos_cutoff = emitters.scalar[emitter, COS_CUTOFF]
+    cos_beam = emitters.scalar[emitter, COS_BEAM]
+    if cos_theta <= cos_cutoff:
+        return ZERO
+    if cos_theta >= cos_beam:
+        return ONE
+    cutoff = np.arccos(cos_cutoff)
+    return np.float32((cutoff - np.arccos(cos_theta)) / (cutoff - np.arccos(cos_beam)))
+
+
+@kernel
+def sample_delta(delta: bool | None, emitters: Emitters, emitter: Index, p: Vec3, select: np.float32) -> DirectionSample:
+    """Light from a point, spot or directional emitter toward ``p``; ``select``: probability of choosing the emitter."""
+    if delta is None:
+        return NO_DIRECTION
+    if emitters.kind[emitter] == DIRECTIONAL:
+        d = neg(axis(emitters, emitter))
+        return DirectionSample(np.int32(emitter), d, d, BEYOND * emitters.bounds[3], scale(row(emitters.rgb, emitter), ONE / select), ZERO)
+    endpoint = position(emitters, emitter)
+    to_light = sub(endpoint, p)
+    squared_distance = dot(to_light, to_light)
+    if squared_distance <= ZERO:
+        return NO_DIRECTION
+    distance = np.sqrt(squared_distance)
+    d = scale(to_light, ONE / distance)
+    weight = scale(row(emitters.rgb, emitter), falloff(emitters, emitter, neg(d)) / (squared_distance * select))
+    return DirectionSample(np.int32(emitter), d, endpoint, distance, weight, ZERO)
+
+
+@kernel
+def sample_delta_direction(delta: bool | None, emitters: Emitters, emitter: Index, u: np.float32, v: np.float32) -> tuple[Vec3, Vec3]:
+    """A direction that leaves a point or spot light, uniform over all directions or its cone, and intensity over density."""
+    if delta is None:
+        return BLACK, BLACK
+    if emitters.kind[emitter] != SPOT:
+        return sample_sphere(u, v), scale(row(emitters.rgb, emitter), FOUR_PI)
+    spread = ONE - emitters.scalar[emitter, COS_CUTOFF]
+    one_minus_cos = u * spread
+    sin_theta = np.sqrt(max(ZERO, one_minus_cos * (ONE + ONE - one_minus_cos)))
+    phi = TWO_PI * v
+    n = axis(emitters, emitter)
+    s, t = tangents(n)
+    d = to_world(s, t, n, (np.cos(phi) * sin_theta, np.sin(phi) * sin_theta, ONE - one_minus_cos))
+    return d, scale(row(emitters.rgb, emitter), falloff(emitters, emitter, d) * TWO_PI * spread)
