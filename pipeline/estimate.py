@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 
 from pipeline.errors import JobError
@@ -34,9 +35,8 @@ class SizeEstimate:
 
 
 def estimate_size(tracer: Tracer, settings: TraceSettings) -> SizeEstimate:
-    """Trace a few thousand walks, evenly spread over the job's ids, and scale their rows up."""
-    count = min(PILOT_WALKS, settings.walks)
-    ids = np.unique((np.arange(count, dtype=np.float64) + 0.5) * (settings.walks / count)).astype(np.uint64)
+    """Trace a few thousand walks, spread over the film, and scale their rows up."""
+    ids = pilot_walks(settings)
     measured = dict.fromkeys((name for name in tracer.schemas() if name != "words"), 0)
 
     def measure(table: str, batch: pa.RecordBatch) -> None:
@@ -50,6 +50,15 @@ def estimate_size(tracer: Tracer, settings: TraceSettings) -> SizeEstimate:
         rows = min(rows, shards[0].count // settings.width + 10)
     film = len(shards) * rows * settings.width * 4 * 8
     return SizeEstimate({name: round(size * settings.walks / len(ids)) for name, size in measured.items()}, film)
+
+
+def pilot_walks(settings: TraceSettings) -> npt.NDArray[np.uint64]:
+    """Ids of the pilot, ascending: one walk in each of many equal pieces of the film, of any pass."""
+    count = min(PILOT_WALKS, settings.walks)
+    rng = np.random.default_rng(0)
+    pixel = np.floor((np.arange(count) + rng.random(count)) * (settings.walks_per_pass / count)).astype(np.uint64)
+    passes = rng.integers(settings.passes, size=count, dtype=np.uint64)
+    return np.unique(passes * np.uint64(settings.walks_per_pass) + pixel)
 
 
 def refuse_too_large(size: SizeEstimate, folder: RunFolder) -> None:

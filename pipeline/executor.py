@@ -29,6 +29,10 @@ class _Failure:
     error: BaseException
 
 
+class Reports(queue.SimpleQueue[Shard | _Failure | None]):
+    """What workers tell the main thread: a finished shard, a failure, or None where a worker ends."""
+
+
 def render_shards(
     folder: RunFolder, shards: Iterable[Shard], settings: TraceSettings, tracers: Iterable[Callable[[], Tracer]], progress: Progress
 ) -> None:
@@ -38,7 +42,7 @@ def render_shards(
     finished stay, Interrupted is raised.
     """
     waiting: queue.SimpleQueue[Shard] = queue.SimpleQueue()
-    reports: queue.SimpleQueue[Shard | _Failure | None] = queue.SimpleQueue()
+    reports = Reports()
     for shard in shards:
         waiting.put(shard)
     stop = threading.Event()
@@ -74,7 +78,7 @@ def render_shards(
         raise error
 
 
-def _listen(reports: "queue.SimpleQueue[Shard | _Failure | None]", workers: int, stop: threading.Event, progress: Progress) -> BaseException | None:
+def _listen(reports: Reports, workers: int, stop: threading.Event, progress: Progress) -> BaseException | None:
     """Follow the workers until all have ended; the first failure, if any."""
     failure: BaseException | None = None
     while workers:

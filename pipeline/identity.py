@@ -1,5 +1,6 @@
 """What makes two runs the same run: the settings of the trace and the compiled scene, down to the last bit."""
 
+import functools
 import hashlib
 import importlib.metadata
 import json
@@ -79,6 +80,7 @@ def fingerprint(settings: TraceSettings, scene: Scene) -> dict[str, Any]:
     return {"settings": settings_as_json(settings), "scene": scene_digest(scene)}
 
 
+@functools.cache
 def renderer_version() -> str:
     """A hash of the renderer's sources and compilers: equal versions give equal bits."""
     return cache_folder().name.removeprefix("kernels-")

@@ -40,7 +40,7 @@ def prepare_job(path: pathlib.Path, overrides: Sequence[str] = ()) -> PreparedJo
 
 
 def check_expressions(loaded: LoadedJob) -> None:
-    """Parse every AOV's expression now, not after hours of rendering."""
+    """Compile every AOV's expression now, not after hours of rendering."""
     if loaded.job.aovs and loaded.job.record.share == 0.0:
         place = next(iter(loaded.aov_places.values()))
         raise JobError(
@@ -49,13 +49,15 @@ def check_expressions(loaded: LoadedJob) -> None:
     if not loaded.job.aovs:
         return
     from queries.errors import QueryError
-    from queries.lpe.parser import parse
+    from queries.lpe import compile
 
     for name, expression in loaded.job.aovs.items():
         try:
-            parse(expression)
+            warnings = compile(expression).warnings
         except QueryError as error:
             raise JobError(f"`aovs.{name}`: {error}, in `{expression}`", loaded.aov_places[name]) from None
+        for warning in warnings:
+            LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
 
 
 def compile_scene(loaded: LoadedJob) -> Scene:

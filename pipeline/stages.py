@@ -28,9 +28,10 @@ from renderer.trace import Tracer
 
 @dataclass
 class Stopwatch:
-    """Seconds of each stage, by name."""
+    """Seconds of each stage, by name, and the process's peak memory by its end (bytes)."""
 
     seconds: dict[str, float] = field(default_factory=dict)
+    peaks: dict[str, int] = field(default_factory=dict)
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -40,6 +41,12 @@ class Stopwatch:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            self.peaks[name] = peak_rss_bytes()
+
+
+def peak_rss_bytes() -> int:
+    """Most memory that the process has held so far, memory-mapped files included."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def default_threads() -> int:
@@ -225,11 +232,16 @@ class Run:
         if not self.job.aovs:
             return
         from queries.images import aov_image
+        from queries.run import open_run
 
-        with progress("AOVs", len(self.job.aovs), "images") as bar:
-            for name, expression in self.job.aovs.items():
-                if not self._has_image(name, expression):
-                    self._write_image(name, aov_image(self.folder.path, expression), expression)
+        def resolve(expression: str) -> images.F32:
+            with open_run(self.folder.path, threads=1) as run:  # one thread adds in stored order: the same bits each time
+                return aov_image(run, expression)
+
+        wanted = {name: expression for name, expression in self.job.aovs.items() if not self._has_image(name, expression)}
+        with ThreadPoolExecutor(self.threads) as pool, progress("AOVs", len(wanted), "images") as bar:
+            for (name, expression), pixels in zip(wanted.items(), pool.map(resolve, wanted.values()), strict=True):
+                self._write_image(name, pixels, expression)
                 bar.advance(1)
 
     def _has_image(self, name: str, expression: str) -> bool:
@@ -261,8 +273,8 @@ class Run:
 
     def _save(self) -> None:
         """Write the manifest with what is known by now."""
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-        self.manifest["stats"] |= {"peak_rss_bytes": peak, "stages": {name: round(s, 4) for name, s in self.watch.seconds.items()}}
+        stages = {name: round(seconds, 4) for name, seconds in self.watch.seconds.items()}
+        self.manifest["stats"] |= {"peak_rss_bytes": peak_rss_bytes(), "stages": stages, "peak_rss_bytes_by_stage": dict(self.watch.peaks)}
         self.folder.write_manifest(self.manifest)
 
 

@@ -1,4 +1,4 @@
-"""Closest hits and occlusion over a list of accelerators: embree for triangles, exact quadrics beside it."""
+"""Closest hits and occlusion over a list of accelerators: triangles by embree or in a flat list, exact quadrics beside them."""
 
 import numpy as np
 import numpy.typing as npt
@@ -6,40 +6,52 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from renderer.scene.arrays import Scene
+from renderer.shapes.flat import BLOCK, FLAT_LIMIT, ROWS, closest_flat, flat_triangles, occluded_flat
 from renderer.shapes.quadrics import intersect_quadrics, occluded_quadrics
 
+F32 = npt.NDArray[np.float32]
+I32 = npt.NDArray[np.int32]
 FAR = np.float32(1e30)  # beyond any scene; embree wants a finite distance
 
 
 class Accelerators:
-    """Answers of rays against one scene. Safe to share between threads; queries release the GIL."""
+    """Answers of rays against one scene. Safe to share between threads; queries release the GIL.
 
-    def __init__(self, scene: Scene) -> None:
-        self.triangles = len(scene.triangles)
-        self.quadrics = scene.arrays.geometry.quadrics
-        self.embree = EmbreeScene()
-        if self.triangles:
+    ``flat_limit``: up to how many triangles are kept in a flat list rather than in embree's tree.
+    """
+
+    def __init__(self, scene: Scene, flat_limit: int = FLAT_LIMIT) -> None:
+        geometry = scene.arrays.geometry
+        self.triangles = len(geometry.p0)
+        self.quadrics = geometry.quadrics
+        self.flat: F32 | None = None
+        if self.triangles <= flat_limit:
+            self.flat = flat_triangles(geometry.p0, geometry.e1, geometry.e2)
+        else:
+            self.embree = EmbreeScene()
             TriangleMesh(self.embree, np.ascontiguousarray(scene.vertices, np.float32), np.ascontiguousarray(scene.triangles, np.int32))
 
-    def closest(self, o: npt.NDArray[np.float32], d: npt.NDArray[np.float32], t: npt.NDArray[np.float32]) -> npt.NDArray[np.int32]:
+    def closest(self, o: F32, d: F32, t: F32) -> I32:
         """The primitive that each ray meets first, -1 where none; ``t`` holds the far ends and receives the distances.
 
         ``o`` and ``d`` are (n, 3), ``t`` is (n,); distances are in units of |d|.
         """
-        if self.triangles:
-            primitive = self.embree.run(o, d, dists=t, query="INTERSECT")
+        if self.flat is not None:
+            primitive = np.empty(len(o), np.int32)
+            closest_flat(self.flat, o, d, t, primitive, len(o), np.empty(ROWS * BLOCK, np.float32))
         else:
-            primitive = np.full(len(o), -1, np.int32)
+            primitive = self.embree.run(o, d, dists=t, query="INTERSECT")
         if self.quadrics is not None:
             intersect_quadrics(self.quadrics, self.triangles, o, d, t, primitive, len(o))
-        return primitive  # type: ignore[no-any-return]
+        return primitive
 
-    def occluded(self, o: npt.NDArray[np.float32], d: npt.NDArray[np.float32], far: npt.NDArray[np.float32]) -> npt.NDArray[np.int32]:
+    def occluded(self, o: F32, d: F32, far: F32) -> I32:
         """0 where something lies between o and o + far d, -1 where the way is free."""
-        if self.triangles:
-            blocked = self.embree.run(o, d, dists=far.copy(), query="OCCLUDED")
+        if self.flat is not None:
+            blocked = np.empty(len(o), np.int32)
+            occluded_flat(self.flat, o, d, far, blocked, len(o), np.empty(ROWS * BLOCK, np.float32))
         else:
-            blocked = np.full(len(o), -1, np.int32)
+            blocked = self.embree.run(o, d, dists=far.copy(), query="OCCLUDED")
         if self.quadrics is not None:
             occluded_quadrics(self.quadrics, self.triangles, o, d, far, blocked, len(o))
-        return blocked  # type: ignore[no-any-return]
+        return blocked

@@ -40,4 +40,4 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
 
 def kernel(function: F) -> F:
     """Compile a function with the project's flags: no GIL, cached on disk, numpy's division, FMA contraction."""
-    return cast(F, numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"})(function))
+    return cast(F, numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False)(function))

@@ -102,7 +102,7 @@ _VERTEX_COLUMNS = (
     Column("throughput_r", "float32", "We or Le over its density times f cos / pdf of each bounce, on arrival here"),
     Column("throughput_g", "float32", "see throughput_r"),
     Column("throughput_b", "float32", "see throughput_r"),
-    Column("primitive", "uint32", "row of triangles (quadrics follow the triangles)", optional=True),
+    Column("primitive", "uint32", "row of triangles (quadrics follow the triangles); 4294967295 where there is no surface", optional=True),
     Column("u", "float32", "weight of the triangle's second corner, or a quadric's first parameter", optional=True),
     Column("v", "float32", "weight of the triangle's third corner, or a quadric's second parameter", optional=True),
 )
@@ -134,7 +134,7 @@ _PATH_COLUMNS = (
 )
 
 PATHS = Table("paths", _PATH_COLUMNS)
-OCCLUDED = Table("occluded", (*_PATH_COLUMNS, Column("blocker", "uint16", "the first object that blocked the connection")))
+OCCLUDED = Table("occluded", (*_PATH_COLUMNS, Column("blocker", "uint16", "the first object that blocked the connection; 65535 where a grazing ray met none the second time")))
 WORDS = Table(
     "words",
     (

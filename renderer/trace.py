@@ -24,9 +24,10 @@ from renderer.kernel import kernel
 from renderer.math.hash import GOLDEN, mix64
 from renderer.scene.arrays import Scene
 from renderer.settings import TraceSettings
-from renderer.tables import OCCLUDED, PATHS, WORDS
+from renderer.tables import NO_OBJECT, OCCLUDED, PATHS, WORDS
 
 TILE = 1 << 15  # walks that advance together: enough to hide Python, few enough for the cache
+WARM_UP_WALKS = 256
 Write = Callable[[str, pa.RecordBatch], None]
 Walks = tuple[int, int] | npt.NDArray[np.uint64]
 
@@ -74,9 +75,9 @@ class Tracer:
         return self.recorder.schemas
 
     def warm_up(self) -> float:
-        """Compile all kernels, or load them from the disk cache, by tracing one walk; the seconds it took."""
+        """Compile all kernels, or load them from the disk cache, by tracing a few walks; the seconds it took."""
         start = time.perf_counter()
-        self.trace((0, 1), lambda _table, _batch: None, Film(self.settings.width, self.settings.height, self.settings.filter))
+        self.trace((0, min(self.settings.walks, WARM_UP_WALKS)), lambda _table, _batch: None, Film(self.settings.width, self.settings.height, self.settings.filter))
         return time.perf_counter() - start
 
     def trace(self, walks: Walks, write: Write | None, film: Film | None) -> TraceCounts:
@@ -141,11 +142,11 @@ class Tracer:
         blocked = self.accelerators.occluded(o, d, far) if m else NO_RAYS
         if recording and self.settings.occluded and m:
             which = np.flatnonzero(blocked >= 0)
-            blocker = np.full(m, -1, np.int32)
+            blocker = np.full(m, NO_OBJECT, np.int32)
             if len(which):
                 primitive = self.accelerators.closest(o[which], d[which], far[which])
-                blocker[which] = self.scene.arrays.geometry.object[primitive]
-                blocked[which[primitive < 0]] = -1
+                met = primitive >= 0  # a grazing ray may be blocked for one query and free for the other
+                blocker[which[met]] = self.scene.arrays.geometry.object[primitive[met]]
             buffers.occluded = grow(buffers.occluded, occluded, occluded + counters.paths - asked)
             occluded = keep_blocked(buffers.paths, asked, counters.paths, blocked, blocker, buffers.occluded, occluded)
         paths = connect(buffers.lanes, buffers.paths, asked, counters.paths, blocked)

@@ -6,7 +6,6 @@ by trying every combination of event type, scattering type and labels that the e
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -15,35 +14,46 @@ from queries.errors import ExpressionError
 from queries.lpe.limits import MAX_CELLS
 from queries.lpe.syntax import EVENT_TYPES, SCATTERING_TYPES, PathEvent, Step, Test
 
-_UNNAMED = "\0"  # a label that no expression can name
-_MAX_TABLE = 50_000_000  # steps times cells
+CAMERA = PathEvent("C", None)
+_UNNAMED = "\0"  # a letter or label that no expression can name
+_TYPES = EVENT_TYPES + _UNNAMED
+_SCATTERINGS = SCATTERING_TYPES + _UNNAMED
+_MAX_TABLE = 20_000_000  # steps times cells
 
 
 class Alphabet:
-    """Symbols 0 … count - 1. ``passes[i, symbol]`` says whether events of the symbol pass step i."""
+    """Symbols 0 … count - 1.
+
+    ``passes``: bool (steps, symbols), whether events of the symbol pass the step; ``types``: bool (symbols, event types), whether it has such events.
+    """
 
     def __init__(self, steps: Sequence[Step]) -> None:
         self.steps = tuple(steps)
-        cells = _cells(self.steps)
-        if len(self.steps) * len(cells) > _MAX_TABLE:
+        carried = _label_sets(self.steps)
+        shape = (len(_TYPES), len(_SCATTERINGS), len(carried))
+        cells = int(np.prod(shape))
+        if cells > MAX_CELLS or len(self.steps) * cells > _MAX_TABLE:
             raise ExpressionError("the expression tells too many kinds of events apart: use fewer different labels and symbols")
-        table = np.zeros((len(self.steps), len(cells)), np.bool_)
+        table = np.zeros((len(self.steps), cells), np.bool_)
         for i, step in enumerate(self.steps):
-            table[i] = _passes(step, cells)
-        packed = np.packbits(table, axis=0)
-        _, chosen = np.unique(packed, axis=1, return_index=True)
-        chosen.sort()
+            table[i] = _passes(step, carried).ravel()
+        _, chosen, symbol_of_cell = np.unique(np.packbits(table, axis=0), axis=1, return_index=True, return_inverse=True)
         self.passes: npt.NDArray[np.bool_] = table[:, chosen]
-        self.examples = [cells[i] for i in chosen]
+        self.types: npt.NDArray[np.bool_] = np.zeros((len(chosen), len(_TYPES)), np.bool_)
+        self.types[symbol_of_cell.ravel(), np.arange(cells) // (cells // len(_TYPES))] = True
         self._symbols = {column.tobytes(): symbol for symbol, column in enumerate(np.ascontiguousarray(self.passes.T))}
 
     def __len__(self) -> int:
         """Number of symbols."""
-        return len(self.examples)
+        return int(self.passes.shape[1])
 
     def symbol(self, event: PathEvent) -> int:
         """The symbol of an event."""
         return self._symbols[np.array([step.accepts(event) for step in self.steps], np.bool_).tobytes()]
+
+    def with_types(self, types: str) -> npt.NDArray[np.int64]:
+        """The symbols that some event of one of these types has."""
+        return np.flatnonzero(self.types[:, [_TYPES.index(letter) for letter in types]].any(axis=1))
 
     @cached_property
     def signatures(self) -> list[str]:
@@ -51,26 +61,29 @@ class Alphabet:
         return ["".join("01"[int(bit)] for bit in column) for column in self.passes.T]
 
 
-def _cells(steps: Sequence[Step]) -> list[PathEvent]:
-    """One event for each combination that the steps may tell apart."""
-    tests: list[Test] = list(dict.fromkeys(test for step in steps for test in step.tests))
-    # Letters that are named anywhere stand for themselves, all others for one more.
-    types = sorted({name for test in tests if test.field == "type" for name in test.names} & set(EVENT_TYPES)) + [_UNNAMED]
-    scatterings = sorted({name for test in tests if test.field == "scattering" for name in test.names} & set(SCATTERING_TYPES)) + [_UNNAMED]
-    # Labels that are always named together are one label.
-    label_sets = list(dict.fromkeys(test.names for test in tests if test.field == "label"))
+def _label_sets(steps: Sequence[Step]) -> list[tuple[str, ...]]:
+    """The sets of labels that the steps may tell apart. Labels that are always named together count as one."""
+    named = list(dict.fromkeys(test.names for step in steps for test in step.tests if test.field == "label"))
+    if not named:
+        return [()]
     kinds: dict[tuple[bool, ...], str] = {}
-    for label in sorted({name for names in label_sets for name in names}):
-        kinds.setdefault(tuple(label in names for names in label_sets), label)
+    for label in sorted({name for names in named for name in names}):
+        kinds.setdefault(tuple(label in names for names in named), label)
     labels = list(kinds.values())
-    count = len(types) * len(scatterings) * (2 ** min(len(labels), 63) + (1 if label_sets else 0))
-    if count > MAX_CELLS:
+    if 2 ** len(labels) > MAX_CELLS:
         raise ExpressionError(f"{len(labels)} labels that events may carry in any combination make too many kinds of events: use fewer labels")
-    carried: list[tuple[str, ...]] = [()] if not label_sets else [(), (_UNNAMED,)]
-    for size in range(1, 2 ** len(labels)):
-        carried.append(tuple(label for i, label in enumerate(labels) if size >> i & 1))
-    return [PathEvent(kind, None if scattering == "x" else scattering, given) for kind, scattering, given in product(types, scatterings, carried)]
+    combinations = (tuple(label for i, label in enumerate(labels) if chosen >> i & 1) for chosen in range(1, 2 ** len(labels)))
+    return [(), (_UNNAMED,), *combinations]
 
 
-def _passes(step: Step, cells: Sequence[PathEvent]) -> npt.NDArray[np.bool_]:
-    return np.fromiter((step.accepts(cell) for cell in cells), np.bool_, len(cells))
+def _passes(step: Step, carried: Sequence[tuple[str, ...]]) -> npt.NDArray[np.bool_]:
+    """Whether events pass a step: bool (types, scattering types, label sets)."""
+
+    def column(field: str, events: list[PathEvent]) -> npt.NDArray[np.bool_]:
+        tests: list[Test] = [test for test in step.tests if test.field == field]
+        return np.array([all(test.accepts(event) for test in tests) for event in events])
+
+    types = column("type", [PathEvent(letter, None) for letter in _TYPES])
+    scatterings = column("scattering", [PathEvent("", None if letter == "x" else letter) for letter in _SCATTERINGS])
+    labels = column("label", [PathEvent("", None, given) for given in carried])
+    return types[:, None, None] & scatterings[None, :, None] & labels[None, None, :]

@@ -197,7 +197,7 @@ def _before(sources: list[int], subset: int) -> int:
 
 
 def alive(dfa: Dfa) -> npt.NDArray[np.bool_]:
-    """bool (states): whether some word leads from the state to acceptance."""
+    """Whether some word leads from each state to acceptance: bool (states)."""
     living = dfa.accepting.copy()
     while True:
         grown = living | living[dfa.transitions].any(axis=1)

@@ -3,8 +3,8 @@
 Each operand of a whole expression is looked at by itself, so ``LS+DE | CDL`` is fine.
 """
 
-from queries.lpe.nfa import build
 from queries.lpe.limits import Work
+from queries.lpe.nfa import build
 from queries.lpe.syntax import EMITTER_TYPES, Choice, Combination, Node, Step, reverse
 
 

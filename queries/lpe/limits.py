@@ -12,7 +12,7 @@ MAX_POSITIONS = 3_000  # symbols after repetitions are written out
 MAX_CELLS = 50_000  # combinations of event type, scattering type and labels that an expression tells apart
 MAX_STATES = 6_000  # states of one automaton
 MAX_TRANSITIONS = 60_000  # states times symbols of one automaton
-MAX_STEPS = 3_000_000  # elementary set operations of one compilation
+MAX_STEPS = 2_000_000  # elementary set operations of one compilation
 
 
 class Work:

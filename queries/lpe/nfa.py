@@ -63,7 +63,7 @@ class _Builder:
 
     def fragment(self, node: Node) -> _Fragment:
         """Where words of a part may begin and end."""
-        self.work.spend(1)
+        self.work.spend(20)
         if isinstance(node, Step):
             return self._symbol(node)
         if isinstance(node, Chain):
@@ -72,11 +72,11 @@ class _Builder:
                 whole = self._then(whole, self.fragment(part))
             return whole
         if isinstance(node, Choice):
-            parts = [self.fragment(part) for part in node.parts]
-            first = last = 0
-            for part in parts:
-                first, last = first | part.first, last | part.last
-            return _Fragment(first, last, any(part.nullable for part in parts))
+            first, last, nullable = 0, 0, False
+            for part in node.parts:
+                inner = self.fragment(part)
+                first, last, nullable = first | inner.first, last | inner.last, nullable or inner.nullable
+            return _Fragment(first, last, nullable)
         if isinstance(node, Repeat):
             return self._repeat(node)
         raise TypeError(f"a {type(node).__name__} has no automaton of its own: combine the automata of its operands")

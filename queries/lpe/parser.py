@@ -251,9 +251,9 @@ class _Parser:
         names: set[str] = set()
         for token in tokens:
             if (token.kind == "label") != (field == "label"):
-                found = "a label" if token.kind == "label" else "a letter"
-                fix = f": labels come third, write `<..'{token.text}'>`" if token.kind == "label" else ""
-                raise ExpressionError(f"expected {'a quoted label' if field == 'label' else f'a {field} letter'}, found {found}, {token}{fix}", token.column)
+                wanted = {"label": "a quoted label", "type": "an event type", "scattering": "a scattering type"}[field]
+                fix = f": labels come third, as in `<..{token}>`" if token.kind == "label" else ""
+                raise ExpressionError(f"expected {wanted}, found {token}{fix}", token.column)
             names |= self.letter(field, token) if token.kind == "letter" else {token.text}
         return Test(field, frozenset(names), mode)
 

@@ -128,10 +128,13 @@ def eval_rough_plastic(m: Bsdf, tables: npt.NDArray[np.float32] | None, lobe: in
 
     if lobe == 0:
         h = normalize(add(wi, wo))
-        d = microfacet_density(m.distribution, m.alpha_u, m.alpha_v, h) / (FOUR * wi[2])
+        d = microfacet_density(m.distribution, m.alpha_u, m.alpha_v, h)
+        if d == ZERO:
+            return event, BLACK, ZERO
         g = smith_g1(m.distribution, m.alpha_u, m.alpha_v, wi, h) * smith_g1(m.distribution, m.alpha_u, m.alpha_v, wo, h)
         f, _, _, _ = fresnel_dielectric(dot(wi, h), m.eta)
-        return event, scale(m.b, f * d * g), p * d * visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+        mass = visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+        return event, scale(m.b, f * d * (g / (FOUR * wi[2]))), p * d * (mass / (FOUR * wi[2]))
 
     pdf = pdf_cosine_hemisphere(wo[2])
     t_o = rough_transmittance(tables, m.table, wo[2])

@@ -40,7 +40,7 @@ def eval_rough_conductor(m: Bsdf, wi: Vec3, wo: Vec3) -> tuple[np.int32, Vec3, n
     d = microfacet_density(m.distribution, m.alpha_u, m.alpha_v, h)
     if d == ZERO:
         return EVENT, BLACK, ZERO
-    d /= FOUR * wi[2]
     g = smith_g1(m.distribution, m.alpha_u, m.alpha_v, wi, h) * smith_g1(m.distribution, m.alpha_u, m.alpha_v, wo, h)
-    value = scale(mul(m.a, fresnel_conductor_rgb(dot(wi, h), m.b, m.c)), d * g)
-    return EVENT, value, d * visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+    # Both fall with cos_i: divide them, not D, which would overflow
+    value = scale(mul(m.a, fresnel_conductor_rgb(dot(wi, h), m.b, m.c)), d * (g / (FOUR * wi[2])))
+    return EVENT, value, d * (visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi) / (FOUR * wi[2]))

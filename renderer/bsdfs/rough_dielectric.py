@@ -28,7 +28,7 @@ def sample_rough_dielectric(m: Bsdf, wi: Vec3, u_lobe: np.float32, u: np.float32
     d = microfacet_density(m.distribution, m.alpha_u, m.alpha_v, h)
     mass = visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
     cos_i = dot(wi, h)
-    pdf = d * mass * abs(cos_i / wi[2])
+    pdf = d * abs(cos_i) * (mass / abs(wi[2]))
     if not pdf > ZERO:
         return NO_SAMPLE
 
@@ -92,8 +92,9 @@ def eval_reflection(m: Bsdf, wi: Vec3, wo: Vec3) -> tuple[Vec3, np.float32]:
     if g == ZERO or d == ZERO:
         return BLACK, ZERO
     f, _, _, _ = fresnel_dielectric(dot(wi, h), m.eta)
-    common = f * d / (FOUR * abs(wi[2]))
-    return scale(m.a, common * g), common * visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+    mass = visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+    # Both fall with cos_i: divide them, not D, which would overflow
+    return scale(m.a, f * d * (g / (FOUR * abs(wi[2])))), f * d * (mass / (FOUR * abs(wi[2])))
 
 
 @kernel
@@ -107,6 +108,7 @@ def eval_transmission(m: Bsdf, wi: Vec3, wo: Vec3, adjoint: bool) -> tuple[Vec3,
         return BLACK, ZERO
     cos_i = dot(wi, h)
     f, _, _, _ = fresnel_dielectric(cos_i, m.eta)
-    common = (ONE - f) * d * abs(cos_i / wi[2]) * half_vector_jacobian(cos_i, dot(wo, h), eta_it)
+    common = (ONE - f) * d * abs(cos_i) * half_vector_jacobian(cos_i, dot(wo, h), eta_it)
     factor = ONE if adjoint else ONE / (eta_it * eta_it)
-    return scale(m.b, common * g * factor), common * visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+    mass = visible_mass(m.distribution, m.alpha_u, m.alpha_v, wi)
+    return scale(m.b, common * factor * (g / abs(wi[2]))), common * (mass / abs(wi[2]))

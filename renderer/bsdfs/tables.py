@@ -20,6 +20,7 @@ from renderer.math.vec import ONE, ZERO, Vec3, dot
 RESOLUTION = 64  # samples of cos theta in [0, 1], both ends included
 NODES_OUTSIDE, NODES_INSIDE = 32, 128  # quadrature nodes on a side; inside, total reflection makes a kink
 SMALLEST_COS = 1e-6
+LARGEST_FITTED_ETA = 3.0
 
 F32 = npt.NDArray[np.float32]
 
@@ -31,7 +32,12 @@ def specular_sampling_weight(diffuse_mean: float, specular_mean: float) -> float
 
 
 def internal_diffuse_reflectance(eta: float) -> float:
-    """Part of diffuse light inside a smooth coat of relative index ``eta`` (interior over exterior) that is reflected back inside."""
+    """Part of diffuse light inside a smooth coat of relative index ``eta`` (interior over exterior) that is reflected back inside.
+
+    Mitsuba's fit, up to an index of 3; it exceeds 1 soon after, so there the exterior's reflectance gives it: F_in = 1 - (1 - F_out) / eta².
+    """
+    if eta > LARGEST_FITTED_ETA:
+        return 1.0 - (1.0 - diffuse_fresnel_reflectance(eta)) / eta**2
     return diffuse_fresnel_reflectance(1.0 / eta)
 
 
@@ -68,7 +74,7 @@ def rough_interface(distribution: int, alpha: float, eta: float, transmitted: bo
     result = np.empty(RESOLUTION, np.float32)
     nodes32 = (0.5 * nodes + 0.5).astype(np.float32)
     integrate_interface(np.int32(distribution), alpha32, np.float32(eta), transmitted, cosines(), nodes32, 0.5 * weights, result)
-    return result
+    return np.clip(result, 0.0, 1.0)
 
 
 @kernel

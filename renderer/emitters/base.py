@@ -39,7 +39,7 @@ class Emitters(NamedTuple):
 
     kind: npt.NDArray[np.int32]  # (ne,)
     object: npt.NDArray[np.int32]  # (ne,) -1 where there is no shape
-    rgb: npt.NDArray[np.float32]  # (ne, 3) radiance, intensity or irradiance
+    rgb: npt.NDArray[np.float32]  # (ne, 3) radiance, intensity, irradiance or (envmap) the scale of its pixels
     texture: npt.NDArray[np.int32]  # (ne,) of the radiance, -1: constant
     frame: npt.NDArray[np.float32]  # (ne, 12)
     scalar: npt.NDArray[np.float32]  # (ne, 7)
@@ -59,7 +59,7 @@ class DirectionSample(NamedTuple):
     emitter: Any  # int32
     d: Vec3  # unit direction from the point to the light
     endpoint: Vec3  # on the light, pushed off its surface by the error bound; the direction d for infinite emitters
-    distance: Any  # float32, to the endpoint; infinite emitters: beyond the scene
+    distance: Any  # float32, to the endpoint; infinite emitters: 1e30
     weight: Vec3  # emitted radiance over density, per steradian (delta: intensity over squared distance)
     pdf: Any  # float32, per steradian, with the probability of choosing the emitter
 

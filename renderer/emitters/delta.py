@@ -9,7 +9,7 @@ from renderer.math.warp import sample_sphere
 from renderer.shapes.base import Index
 
 FOUR_PI = np.float32(4 * np.pi)
-BEYOND = np.float32(4.0)  # radii of the scene: farther than any two of its points are apart
+BEYOND = np.float32(1e30)  # the distance of what is infinitely far
 
 
 @kernel
@@ -50,7 +50,7 @@ def sample_delta(delta: bool | None, emitters: Emitters, emitter: Index, p: Vec3
         return NO_DIRECTION
     if emitters.kind[emitter] == DIRECTIONAL:
         d = neg(axis(emitters, emitter))
-        return DirectionSample(np.int32(emitter), d, d, BEYOND * emitters.bounds[3], scale(row(emitters.rgb, emitter), ONE / select), ZERO)
+        return DirectionSample(np.int32(emitter), d, d, BEYOND, scale(row(emitters.rgb, emitter), ONE / select), ZERO)
     endpoint = position(emitters, emitter)
     to_light = sub(endpoint, p)
     squared_distance = dot(to_light, to_light)

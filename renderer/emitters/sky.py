@@ -53,4 +53,4 @@ def sample_sky_direction(sky: bool | None, emitters: Emitters, u: np.float32, v:
     pdf = density * select
     if pdf <= ZERO:
         return NO_DIRECTION
-    return DirectionSample(np.int32(emitters.infinite), d, d, BEYOND * emitters.bounds[3], scale(radiance, ONE / pdf), pdf)
+    return DirectionSample(np.int32(emitters.infinite), d, d, BEYOND, scale(radiance, ONE / pdf), pdf)

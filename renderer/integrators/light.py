@@ -229,6 +229,6 @@ def interact_light(
 
         # ---- the vertex, with what became of the walk ----
         if kept:
-            set_surface_point(vertices, n_vertices, primitive, hit)
             n_vertices = append_vertex(vertices, n_vertices, lane, depth, event, thing, hit.p, beta)
+            set_surface_point(vertices, n_vertices - 1, primitive, hit)
     return Counters(n_out, n_shadow, n_vertices, n_paths, n_words)

@@ -53,10 +53,11 @@ class MinimalPathTracer:
 
             # light that it emits
             emitter = scene.objects.emitter[hit.object]
-            if emitter >= 0 and wi[2] > 0:
+            cos_light = np.float32(-np.dot(hit.ng, d))
+            if emitter >= 0 and cos_light > 0:
                 weight = 1.0
                 if last_pdf > 0:
-                    weight = power_heuristic(last_pdf, pdf_direction(emitters, scene.geometry, emitter, o, d, t, wi[2], primitive))
+                    weight = power_heuristic(last_pdf, pdf_direction(emitters, scene.geometry, emitter, o, d, t, cos_light, primitive))
                 total += beta * emitted(emitters, textures, emitter, hit.u, hit.v) * weight
 
             # its material, seen from its front

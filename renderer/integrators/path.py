@@ -166,10 +166,11 @@ def interact(
 
         # ---- light that the surface emits ----
         emitter = objects.emitter[thing]
-        if emitter >= 0 and wi[2] > ZERO:
+        cos_light = -dot(hit.ng, d)
+        if emitter >= 0 and cos_light > ZERO:
             weight = ONE
             if last_pdf > ZERO:
-                weight = power_heuristic(last_pdf, pdf_direction(emitters, geometry, emitter, o, d, t[i], wi[2], primitive))
+                weight = power_heuristic(last_pdf, pdf_direction(emitters, geometry, emitter, o, d, t[i], cos_light, primitive))
             c = scale(mul(beta, emitted(emitters, textures, emitter, hit.u, hit.v)), weight)
             if finite(c):
                 n_paths = append_path(paths, n_paths, lane, -1, EMITTER_HIT, depth, EMITTER, word, emitter, hit.p, c, weight)
@@ -252,6 +253,6 @@ def interact(
 
         # ---- the vertex, with what became of the walk ----
         if kept:
-            set_surface_point(vertices, n_vertices, primitive, hit)
             n_vertices = append_vertex(vertices, n_vertices, lane, depth, event, thing, hit.p, beta)
+            set_surface_point(vertices, n_vertices - 1, primitive, hit)
     return Counters(n_out, n_shadow, n_vertices, n_paths, n_words)

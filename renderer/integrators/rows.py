@@ -4,7 +4,7 @@ import numpy as np
 
 from renderer.integrators.buffers import SEEN, PathRows, Rays, ShadowRays, VertexRows, WordRows
 from renderer.kernel import kernel
-from renderer.math.vec import Vec3
+from renderer.math.vec import ZERO, Vec3
 from renderer.shapes.base import Hit
 
 SEEN_MASK = np.uint64(SEEN - 1)
@@ -23,12 +23,15 @@ def append_vertex(rows: VertexRows, k: int, lane: int, depth: int, event: int, o
     rows.beta[k, 0] = beta[0]
     rows.beta[k, 1] = beta[1]
     rows.beta[k, 2] = beta[2]
+    rows.primitive[k] = -1
+    rows.uv[k, 0] = ZERO
+    rows.uv[k, 1] = ZERO
     return k + 1
 
 
 @kernel
 def set_surface_point(rows: VertexRows, k: int, primitive: int, hit: Hit) -> None:
-    """Write where on its primitive the vertex of row k lies."""
+    """Write where on its primitive the vertex of row k, already there, lies."""
     rows.primitive[k] = primitive
     rows.uv[k, 0] = hit.b1
     rows.uv[k, 1] = hit.b2

@@ -27,7 +27,7 @@ from renderer.bsdfs.base import (
 )
 from renderer.errors import SceneError
 from renderer.scene.context import Context
-from renderer.scene.description import Node, listing, nearest
+from renderer.scene.description import Node
 from renderer.scene.optics import conductor_constants, relative_ior
 from renderer.scene.reader import Reader
 from renderer.scene.spectra import Rgb
@@ -89,7 +89,7 @@ class MaterialTable:
             return Sides(row, row, False, name)
         reader = Reader(node)
         inner = reader.children(BSDFS, "BSDFs", most=2)
-        reader.finish(listing(k for k in KINDS if k not in TRANSMISSIVE))
+        reader.finish([kind for kind in KINDS if kind not in TRANSMISSIVE])
         if not inner:
             raise reader.error("needs one BSDF for both sides, or two")
         for child in inner:
@@ -214,7 +214,8 @@ def coated(reader: Reader, context: Context) -> Material:
 def distribution(reader: Reader, context: Context) -> int:
     """The microfacet distribution. Visible normals are sampled whatever the description says: the picture is the same."""
     if not reader.flag("sample_visible", True):
-        context.warn(f"{reader.node.plugin}: visible normals are sampled although 'sample_visible' is false; the picture is the same", reader.node.place)
+        message = "visible normals are sampled although 'sample_visible' is false; the picture is the same"
+        context.warn(f"{reader.node.plugin}: {message}", reader.node.place)
     return DISTRIBUTIONS[reader.choice("distribution", "beckmann", tuple(DISTRIBUTIONS))]
 
 
@@ -230,7 +231,8 @@ def roughness(reader: Reader, context: Context) -> tuple[int, tuple[Slot, Slot]]
     for name in given or ["alpha"]:
         alpha = slot(reader, name, 0.1, context, bounded=False)
         if alpha.texture < 0 and not alpha.rgb[0] > 0:
-            raise reader.error(f"{name!r} must be more than 0 (a smooth surface is a {reader.node.plugin.removeprefix('rough')!r}); it is {alpha.rgb[0]:g}", name)
+            smooth = reader.node.plugin.removeprefix("rough")
+            raise reader.error(f"{name!r} must be more than 0 (a smooth surface is a {smooth!r}); it is {alpha.rgb[0]:g}", name)
         slots.append(alpha)
     return kind, (slots[0], slots[-1])
 

@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 
 from renderer.errors import SceneError
-from renderer.scene.arrays import EmitterInfo, ObjectInfo, Objects, RenderDefaults, Scene, SceneArrays
+from renderer.scene.arrays import ObjectInfo, Objects, RenderDefaults, Scene, SceneArrays
 from renderer.scene.bsdfs import BSDFS, MaterialTable, Sides
+from renderer.scene.checks import sound_surface, warn_of_inside
 from renderer.scene.context import Context
 from renderer.scene.description import Node, listing, nearest, plain, resolve
-from renderer.scene.emitters import EMITTERS, Light, area_light, pack_emitters
-from renderer.scene.geometry import Assembly, Surface, assemble
+from renderer.scene.emitters import EMITTERS, Light, area_light, free_light, pack_emitters
+from renderer.scene.geometry import Mesh, Surface, assemble
 from renderer.scene.paths import Paths
 from renderer.scene.reader import Reader
 from renderer.scene.sensors import FILMS, SAMPLERS, SENSORS, read_sensor
@@ -40,43 +41,43 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
         surfaces.append(SHAPES[node.plugin](reader, paths))
         bsdf, light = reader.children(BSDFS, "BSDFs"), reader.children(("area",), "emitters")
         reader.ignore("silhouette_sampling_weight")
-        reader.finish(f"one BSDF ({listing(BSDFS)}) and one 'area' emitter")
+        reader.finish((*BSDFS, "area"))
+        surfaces[-1] = sound_surface(surfaces[-1], node, context)
         area_nodes.append(light[0] if light else None)
         sides.append(Sides(-1, -1, False, "none") if light and not bsdf else materials.sides(bsdf[0] if bsdf else None))
     if not surfaces:
         raise SceneError(f"the scene has no shape; supported: {listing(SHAPES)}", root.place)
 
-    # Emitters on surfaces are built once the primitives' numbers are known; textures decide what geometry must keep
+    # Textures decide what geometry must keep; emitters on surfaces need the primitives' numbers
     textured = bool(context.textures.rows) or any(m.anisotropic for m in materials.rows)
     textured = textured or any(node is not None and has_texture(node) for node in area_nodes)
     assembly = assemble(surfaces, textured)
-    names = [node.name for node in parts["shapes"]]
-    lights = [
-        area_light(node, i, node.name if node.named else names[i], surfaces[i], assembly, context)
-        for i, node in enumerate(area_nodes)
-        if node is not None
-    ]
-    row_of_object = {light.info.object: row for row, light in enumerate(lights)}
-    if not lights:
-        raise SceneError(f"the scene has no emitter, so every picture of it is black; supported: {listing(EMITTERS)}", root.place)
-    warn_dark(lights, parts, context)
+    lights: list[Light] = []
+    emitter_of = np.full(len(surfaces), -1, np.int32)
+    for i, (shape, area) in enumerate(zip(parts["shapes"], area_nodes, strict=True)):
+        if area is not None:
+            emitter_of[i] = len(lights)
+            lights.append(area_light(area, i, area.name if area.named else shape.name, surfaces[i], assembly, context))
+    lights += [free_light(node, context) for node in parts["emitters"]]
+    check_lights(lights, root, parts, context)
 
     sensor, film, samples = read_sensor(one_sensor(parts["sensors"], root), context)
+    warn_of_inside(sensor, parts["shapes"], surfaces, sides, materials, context)
     method, max_depth, rr_depth = read_integrator(parts["integrators"])
     infos = object_infos(parts["shapes"], surfaces, sides)
     objects = Objects(
         np.array([s.front for s in sides], np.int32),
         np.array([s.back for s in sides], np.int32),
         np.array([s.two_sided for s in sides], np.uint8),
-        np.array([row_of_object.get(i, -1) for i in range(len(sides))], np.int32),
+        emitter_of,
     )
     low, high = np.min([info.bounds[0] for info in infos], axis=0), np.max([info.bounds[1] for info in infos], axis=0)
-    emitters = pack_emitters(lights, (low, high), None)
+    emitters = pack_emitters(lights, (low, high))
     arrays = SceneArrays(assembly.geometry, objects, materials.pack(), materials.families(), context.textures.pack(), emitters, sensor)
     return Scene(
         arrays=arrays,
         objects=infos,
-        emitters=emitter_infos(lights),
+        emitters=tuple(light.info for light in lights),
         defaults=RenderDefaults(film.width, film.height, film.filter, samples, method, max_depth, rr_depth),
         vertices=assembly.vertices,
         triangles=assembly.triangles,
@@ -100,7 +101,20 @@ def sort_parts(root: Node) -> dict[str, list[Node]]:
             hint = nearest(node.plugin, KNOWN)
             supported = f"supported in a scene: {listing((*SHAPES, *EMITTERS, *BSDFS, *SENSORS, *INTEGRATORS))}"
             raise SceneError(f"{node.plugin!r} is not supported{hint}; {supported}", node.place)
+    name_apart(parts["shapes"])
     return parts
+
+
+def name_apart(nodes: list[Node]) -> None:
+    """Give shapes that nobody named, and whose made-up names are taken, names of their own."""
+    taken = {node.name for node in nodes if node.named}
+    for node in nodes:
+        if not node.named:
+            name, n = node.name, 1
+            while node.name in taken:
+                n += 1
+                node.name = f"{name}_{n}"
+            taken.add(node.name)
 
 
 def has_texture(node: Node) -> bool:
@@ -133,18 +147,18 @@ def object_infos(nodes: list[Node], surfaces: list[Surface], sides: list[Sides])
     """The catalogue of objects."""
     infos = []
     for node, surface, side in zip(nodes, surfaces, sides, strict=True):
-        area = surface.area() if not hasattr(surface, "areas") else float(surface.areas().sum())
+        area = float(surface.areas().sum()) if isinstance(surface, Mesh) else surface.area()
         infos.append(ObjectInfo(node.name, node.plugin, side.name, surface.bounds(), area))
     return tuple(infos)
 
 
-def emitter_infos(lights: list[Light]) -> tuple[EmitterInfo, ...]:
-    """The catalogue of emitters."""
-    return tuple(light.info for light in lights)
-
-
-def warn_dark(lights: list[Light], parts: dict[str, list[Node]], context: Context) -> None:
-    """Warn of emitters that give no light."""
+def check_lights(lights: list[Light], root: Node, parts: dict[str, list[Node]], context: Context) -> None:
+    """A scene needs an emitter, has at most one around it, and is warned of black ones."""
+    if not lights:
+        raise SceneError(f"the scene has no emitter, so every picture of it is black; supported: {listing(EMITTERS)}", root.place)
+    around = [node for node in parts["emitters"] if node.plugin in ("constant", "envmap")]
+    if len(around) > 1:
+        raise SceneError("the scene has more than one environment; expected at most one 'constant' or 'envmap'", around[1].place)
     for light in lights:
         if light.texture < 0 and not any(light.rgb):
-            context.warn(f"the emitter {light.info.name!r} gives no light: it is black", light.info.kind)
+            context.warn(f"the emitter {light.info.name!r} gives no light: it is black", root.place)

@@ -132,9 +132,11 @@ def plain(root: Node, shared: set[str]) -> dict[str, Any]:
 
     def hoist(value: Node) -> None:
         if id(value) not in placed:
-            placed[id(value)] = value.name
-            written = node(value)
-            top[value.name] = written
+            key = value.name
+            while key in top or key in placed.values():
+                key += "_"
+            placed[id(value)] = key
+            top[key] = node(value)
 
     for _, child in root.children():
         hoist(child)

@@ -1,5 +1,7 @@
-"""Emitters of a description as rows of the emitter table."""
+"""Emitters of a description as rows of the emitter table, with Mitsuba's defaults."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +17,8 @@ from renderer.emitters.base import (
     AREA_SPHERE,
     CDF_FIRST,
     CONSTANT,
+    COS_BEAM,
+    COS_CUTOFF,
     DIRECTIONAL,
     ENVMAP,
     OFFSET,
@@ -25,18 +29,20 @@ from renderer.emitters.base import (
     Emitters,
     Environment,
 )
+from renderer.errors import SceneError
+from renderer.scene import transforms
 from renderer.scene.arrays import EmitterInfo
 from renderer.scene.context import Context
 from renderer.scene.description import Node
 from renderer.scene.geometry import Assembly, Mesh, Surface
 from renderer.scene.reader import Reader
-from renderer.scene.spectra import Rgb
-from renderer.scene.textures import slot
+from renderer.scene.shapes import frame
+from renderer.scene.spectra import COLORS, Rgb, color
+from renderer.scene.textures import TEXTURES, slot
 from renderer.shapes.base import CYLINDER, DISK, SPHERE
 
 AREA_KINDS = {SPHERE: AREA_SPHERE, DISK: AREA_DISK, CYLINDER: AREA_CYLINDER}
 EMITTERS = ("area", "point", "spot", "directional", "constant", "envmap")
-INFINITE = ("directional", "constant", "envmap")
 
 
 @dataclass
@@ -51,6 +57,90 @@ class Light:
     scalar: dict[int, float] = field(default_factory=dict)
     primitive: tuple[int, int] = (0, 0)
     cdf: npt.NDArray[np.float64] | None = None
+    environment: Environment | None = None
+
+
+# --- emitters without a shape -------------------------------------------------------------------------------------
+
+
+def point_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
+    """An intensity that is the same in all directions, from a position or the origin of ``to_world``."""
+    if reader.has("position") and reader.has("to_world"):
+        raise reader.error("give either 'position' or 'to_world', not both", "position")
+    to_world = transforms.translate(reader.vector("position", [0.0, 0.0, 0.0])) @ reader.transform("to_world")
+    return Light(POINT, info, color(reader, "intensity", 1.0, bounded=False), frame=to_world[:3].reshape(-1))
+
+
+def spot_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
+    """A cone of light along +z: full intensity within the beam, then falling linearly in the angle to zero at the cutoff."""
+    if reader.has("texture"):
+        raise reader.error("projected textures are not supported", "texture")
+    cutoff = reader.number("cutoff_angle", 20.0, above=0, high=180)
+    beam = reader.number("beam_width", cutoff * 0.75, low=0, high=cutoff)
+    to_world = transforms.without_scale(reader.transform("to_world"))
+    scalar = {COS_CUTOFF: math.cos(math.radians(cutoff)), COS_BEAM: math.cos(math.radians(beam))}
+    return Light(SPOT, info, color(reader, "intensity", 1.0, bounded=False), frame=to_world[:3].reshape(-1), scalar=scalar)
+
+
+def directional_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
+    """Parallel light along ``direction``, or along +z of ``to_world``."""
+    if reader.has("direction") and reader.has("to_world"):
+        raise reader.error("give either 'direction' or 'to_world', not both", "direction")
+    to_world = transforms.without_scale(reader.transform("to_world"))
+    if reader.has("direction"):
+        direction = np.array(reader.vector("direction"))
+        length = np.linalg.norm(direction)
+        if not length > 0:
+            raise reader.error("'direction' must not be zero", "direction")
+        to_world[:3, :3] = np.stack([*frame(direction / length), direction / length], axis=1)
+    return Light(DIRECTIONAL, info, color(reader, "irradiance", 1.0, bounded=False), frame=to_world[:3].reshape(-1))
+
+
+def constant_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
+    """The same radiance from everywhere."""
+    return Light(CONSTANT, info, color(reader, "radiance", 1.0, bounded=False))
+
+
+def environment_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
+    """Radiance from an image in latitude and longitude."""
+    from renderer.emitters.envmap import build_environment
+
+    path, place = context.paths.file(reader)
+    scale = reader.number("scale", 1.0, low=0)
+    reader.flag("mis_compensation", False)  # changes how the map is sampled, not the picture
+    to_world = reader.transform("to_world")[:3, :3]
+    if not np.allclose(to_world @ to_world.T, np.eye(3), atol=1e-4):
+        raise reader.error("'to_world' must only turn an environment map, not scale or shear it", "to_world")
+    try:
+        environment = build_environment(context.textures.image(path, False), to_world)
+    except SceneError as error:
+        raise SceneError(f"envmap: {error}", place) from None
+    return Light(ENVMAP, info, (scale, scale, scale), environment=environment)
+
+
+FREE_LIGHTS: dict[str, Callable[[Reader, EmitterInfo, Context], Light]] = {
+    "point": point_light,
+    "spot": spot_light,
+    "directional": directional_light,
+    "constant": constant_light,
+    "envmap": environment_light,
+}
+
+
+def free_light(node: Node, context: Context) -> Light:
+    """An emitter that belongs to no shape."""
+    if node.plugin == "area":
+        raise SceneError("an 'area' emitter must stand inside a shape, which then shines", node.place)
+    reader = Reader(node)
+    infinite = node.plugin in ("directional", "constant", "envmap")
+    symbol = "B" if node.plugin in ("constant", "envmap") else "L"
+    reader.number("sampling_weight", 1.0)
+    light = FREE_LIGHTS[node.plugin](reader, EmitterInfo(node.name, node.plugin, -1, infinite, symbol), context)
+    reader.finish()
+    return light
+
+
+# --- shapes that shine --------------------------------------------------------------------------------------------
 
 
 def area_light(node: Node, object_index: int, name: str, surface: Surface, assembly: Assembly, context: Context) -> Light:
@@ -58,7 +148,7 @@ def area_light(node: Node, object_index: int, name: str, surface: Surface, assem
     reader = Reader(node)
     rgb, texture = slot(reader, "radiance", 1.0, context, bounded=False)
     reader.number("sampling_weight", 1.0)
-    reader.finish()
+    reader.finish(COLORS + TEXTURES)
     first, count = assembly.first[object_index], assembly.count[object_index]
     info = EmitterInfo(name, "area", object_index, False, "L")
     light = Light(AREA_MESH, info, rgb, texture, primitive=(first, count))
@@ -81,7 +171,10 @@ def area_light(node: Node, object_index: int, name: str, surface: Surface, assem
     return light
 
 
-def pack_emitters(lights: list[Light], bounds: tuple[Any, Any], environment: Environment | None) -> Emitters:
+# --- packing ------------------------------------------------------------------------------------------------------
+
+
+def pack_emitters(lights: list[Light], bounds: tuple[Any, Any]) -> Emitters:
     """The emitter table as kernels read it; ``bounds`` are the scene's."""
     n = len(lights)
     scalar = np.zeros((n, 7), np.float32)
@@ -109,5 +202,5 @@ def pack_emitters(lights: list[Light], bounds: tuple[Any, Any], environment: Env
         True if kinds & {AREA_MESH, AREA_SPHERE, AREA_DISK, AREA_CYLINDER} else None,
         True if kinds & {POINT, SPOT, DIRECTIONAL} else None,
         True if kinds & {CONSTANT, ENVMAP} else None,
-        environment,
+        next((light.environment for light in lights if light.environment is not None), None),
     )

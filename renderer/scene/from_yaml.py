@@ -51,7 +51,7 @@ class YamlReader:
         if isinstance(item, yaml.SequenceNode):
             return [self.data(value, depth + 1) for value in item.value]
         text = item.value
-        if item.style is not None:
+        if not isinstance(item, yaml.ScalarNode) or item.style is not None:
             return text
         if text in WORDS:
             return WORDS[text]
@@ -118,5 +118,7 @@ def read_yaml(path: pathlib.Path) -> Node:
     """The tree of a YAML file."""
     try:
         return node_from_yaml(path.read_text(encoding="utf-8"), str(path))
+    except OSError as error:
+        raise SceneError(f"cannot read the file: {error.strerror}", str(path)) from None
     except UnicodeDecodeError:
         raise SceneError("this is not text (expected YAML in UTF-8)", str(path)) from None

@@ -106,21 +106,21 @@ def assemble(surfaces: Sequence[Surface], textured: bool) -> Assembly:
         first[i] = nt + k
 
     # Triangles: corners and edges in float32, as rays will see them; normals from those edges
-    corners = np.concatenate([m.corners() for _, m in meshes]) if meshes else np.zeros((0, 3, 3), np.float32)
+    corners = np.concatenate([np.zeros((0, 3, 3), np.float32), *(m.corners() for _, m in meshes)])
     p0 = np.ascontiguousarray(corners[:, 0])
     e1, e2 = corners[:, 1] - p0, corners[:, 2] - p0
     ng = np.cross(e1.astype(np.float64), e2.astype(np.float64))
     ng /= np.linalg.norm(ng, axis=1, keepdims=True)
-    ng *= np.repeat([-1.0 if m.flip else 1.0 for _, m in meshes], counts)[:, None] if meshes else 1.0
+    ng *= np.repeat(np.array([-1.0 if m.flip else 1.0 for _, m in meshes]), counts)[:, None]
     normals = corner_normals([m for _, m in meshes], ng)
-    uvs = np.concatenate([corner_uvs(m) for _, m in meshes]) if textured and meshes else (np.zeros((0, 3, 2), np.float32) if textured else None)
+    uvs = np.concatenate([np.zeros((0, 3, 2), np.float32), *(corner_uvs(m) for _, m in meshes)]) if textured else None
 
-    objects = [i for i, m in meshes for _ in range(len(m.faces))] if nt < 1000 else np.repeat([i for i, _ in meshes], counts)
-    owner = np.concatenate([np.asarray(objects, np.int32), np.asarray([i for i, _ in quadrics], np.int32)])
+    owner = np.concatenate([np.repeat(np.array([i for i, _ in meshes], np.int32), counts), np.array([i for i, _ in quadrics], np.int32)])
     offset = np.concatenate([bounds.triangle_offsets(p0, e1, e2), quadric_offsets(quadrics)]).astype(np.float32)
     starts = np.cumsum([0] + [len(m.positions) for _, m in meshes])
-    vertices = np.concatenate([m.positions for _, m in meshes]).astype(np.float32) if meshes else np.zeros((0, 3), np.float32)
-    triangles = np.concatenate([m.faces + s for (_, m), s in zip(meshes, starts, strict=False)]).astype(np.int32) if meshes else np.zeros((0, 3), np.int32)
+    vertices = np.concatenate([np.zeros((0, 3)), *(m.positions for _, m in meshes)]).astype(np.float32)
+    rows = [m.faces + start for (_, m), start in zip(meshes, starts, strict=False)]
+    triangles = np.concatenate([np.zeros((0, 3), np.int64), *rows]).astype(np.int32)
     geometry = Geometry(p0, e1, e2, ng.astype(np.float32), offset, owner, normals, uvs, pack_quadrics([q for _, q in quadrics]))
     return Assembly(geometry, vertices, triangles, first, count)
 

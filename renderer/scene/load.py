@@ -8,11 +8,14 @@ from renderer.errors import SceneError
 from renderer.scene.arrays import Scene
 from renderer.scene.compile import compile_scene
 from renderer.scene.from_dict import node_from_dict
+from renderer.scene.from_xml import read_xml
 from renderer.scene.from_yaml import read_yaml
 from renderer.scene.paths import Paths
 
 
-def load_scene(source: str | pathlib.Path | Mapping[str, Any], parameters: Mapping[str, str] | None = None, base: pathlib.Path | None = None) -> Scene:
+def load_scene(
+    source: str | pathlib.Path | Mapping[str, Any], parameters: Mapping[str, str] | None = None, base: pathlib.Path | None = None
+) -> Scene:
     """Load and compile a scene.
 
     Args:
@@ -28,10 +31,15 @@ def load_scene(source: str | pathlib.Path | Mapping[str, Any], parameters: Mappi
         refuse_parameters(parameters, "a dictionary")
         return compile_scene(node_from_dict(source), Paths([base or pathlib.Path.cwd()]))
     path = pathlib.Path(source)
-    if not path.is_file():
-        raise SceneError(f"there is no scene file {str(path)!r}" if not path.is_dir() else f"{str(path)!r} is a folder; expected a scene file")
+    try:
+        if not path.is_file():
+            raise SceneError(f"{str(path)!r} is a folder; expected a scene file" if path.is_dir() else f"there is no scene file {str(path)!r}")
+    except (OSError, ValueError) as error:  # a name that no file can have
+        raise SceneError(f"cannot open the scene file {str(path)!r:.200}: {error}") from None
     paths = Paths([base or path.parent])
-    refuse_parameters(parameters, "YAML")
+    if path.suffix.lower() == ".xml":
+        return compile_scene(read_xml(path, parameters or {}, paths), paths)
+    refuse_parameters(parameters, "a YAML file")
     return compile_scene(read_yaml(path), paths)
 
 

@@ -1,8 +1,9 @@
-"""Measured optical constants by name, equal to Mitsuba's: indices of refraction, and metals in linear RGB."""
+"""Optical constants by name, equal to Mitsuba's: indices of refraction, and metals in linear RGB."""
 
 import math
 
 from renderer.scene.description import listing, nearest
+from renderer.scene.metals import METALS
 from renderer.scene.reader import Reader
 from renderer.scene.spectra import Rgb, color
 
@@ -38,7 +39,8 @@ def index_of_refraction(reader: Reader, name: str, default: str) -> float:
     data = reader.value(name, default)
     if isinstance(data, str):
         if data.lower() not in INDICES:
-            raise reader.error(f"{name!r}: no index of refraction is known for {data!r}{nearest(data.lower(), INDICES)}; known: {listing(INDICES)}", name)
+            hint = nearest(data.lower(), INDICES)
+            raise reader.error(f"{name!r}: no index of refraction is known for {data!r}{hint}; known: {listing(INDICES)}", name)
         return INDICES[data.lower()]
     return reader.number(name, default, above=0)
 
@@ -51,17 +53,11 @@ def relative_ior(reader: Reader, interior: str) -> float:
     return eta
 
 
-METALS: dict[str, tuple[Rgb, Rgb]] = {"none": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0))}
-
-
 def conductor_constants(reader: Reader) -> tuple[Rgb, Rgb]:
     """Complex index of refraction of a metal: (eta, k), by ``material`` or by both numbers."""
     if reader.has("eta") or reader.has("k"):
         if reader.has("material"):
             raise reader.error("give either 'material' or 'eta' and 'k', not both", "material")
-        missing = "k" if reader.has("eta") else "eta"
-        if not reader.has(missing):
-            raise reader.error(f"the property {missing!r} is missing: 'eta' and 'k' must stand together")
         return color(reader, "eta", 0.0, bounded=False), color(reader, "k", 1.0, bounded=False)
     name = reader.text("material", "none")
     if name not in METALS:

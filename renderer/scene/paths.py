@@ -5,6 +5,8 @@ import pathlib
 from collections.abc import Sequence
 
 from renderer.errors import SceneError
+from renderer.scene.description import Value
+from renderer.scene.reader import Reader
 
 PACKAGE = "package:"
 
@@ -24,7 +26,7 @@ class Paths:
             raise SceneError(f"{name!r} is not a file name", place)
         if name.startswith(PACKAGE):
             return package_file(name, place)
-        tried = [folder / name for folder in self.folders]
+        tried = [folder.absolute() / name for folder in self.folders]
         try:
             found = [path for path in tried if path.is_file()]
         except OSError as error:
@@ -32,6 +34,14 @@ class Paths:
         if not found:
             raise SceneError(f"there is no file {name!r}; looked for {' and '.join(str(path) for path in tried)}", place)
         return found[0].resolve()
+
+    def file(self, reader: Reader) -> tuple[pathlib.Path, str]:
+        """The file that a node's ``filename`` means, and where it is named. The node then has the absolute path."""
+        name = reader.text("filename")
+        place = reader.node.properties["filename"].place
+        path = self.find(name, place)
+        reader.node.properties["filename"] = Value(str(path), place)
+        return path, place
 
 
 def package_file(name: str, place: str) -> pathlib.Path:

@@ -55,7 +55,8 @@ class Reader:
         data = self.value(name, default)
         if isinstance(data, bool) or not isinstance(data, int | float):
             raise self.error(f"{name!r} must be a number, not {shown(data)}", name)
-        bounds = [text for text, given in ((f"at least {low:g}", low), (f"at most {high:g}", high), (f"more than {above:g}", above)) if math.isfinite(given)]
+        named = ((f"at least {low:g}", low), (f"at most {high:g}", high), (f"more than {above:g}", above))
+        bounds = [text for text, given in named if math.isfinite(given)]
         if not math.isfinite(data) or not low <= data <= high or not data > above:
             raise self.error(f"{name!r} must be a finite number{', ' + ' and '.join(bounds) if bounds else ''}; it is {data!r}", name)
         return float(data)
@@ -131,12 +132,13 @@ class Reader:
         for name in names:
             self.asked[name] = None
 
-    def finish(self, children: str = "") -> None:
-        """Refuse every property that was not asked for; ``children`` says which nested objects would be fine."""
+    def finish(self, children: Sequence[str] = ()) -> None:
+        """Refuse every property that was not asked for; ``children`` are the plugins that can be nested here."""
         for name, value in self.node.properties.items():
             if name not in self.asked:
                 known = sorted(n for n in self.asked if n not in dict(self.node.children()) or n in self.node.properties)
                 if isinstance(value.data, Node) and not nearest(name, known):
-                    fine = f"; what can stand here: {children}" if children else ""
-                    raise SceneError(f"{self.node.plugin}: the nested {value.data.plugin!r} ({name}) is not supported here{fine}", value.data.place)
+                    inner = value.data
+                    fine = f"{nearest(inner.plugin, children)}; supported here: {listing(children)}" if children else ""
+                    raise SceneError(f"{self.node.plugin}: a nested {inner.plugin!r} ({name}) is not supported{fine}", inner.place)
                 raise self.error(f"unknown property {name!r}{nearest(name, known) or '; known: ' + listing(known)}", name)

@@ -20,6 +20,7 @@ SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 FULL_FRAME_DIAGONAL = math.hypot(36, 24)  # mm, of the 35 mm film that focal lengths refer to
 LARGEST_FILM = 65536
+FILTER_SETTINGS = {"gaussian": {"stddev": 0.5}, "mitchell": {"A": 1 / 3, "B": 1 / 3}, "lanczos": {"lobes": 3.0}, "tent": {"radius": 1.0}}
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,11 @@ def read_film(node: Node | None) -> Film:
             raise reader.error(f"{name!r}: cropped films are not supported; render the whole film", name)
     reader.ignore("file_format", "pixel_format", "component_format", "banner", "compensate", "high_quality_edges", "sample_border")
     chosen = reader.children(tuple(FILTERS), "reconstruction filters")
-    reader.finish("reconstruction filters: " + ", ".join(FILTERS))
+    reader.finish(tuple(FILTERS))
     name = "gaussian"
     for item in chosen:
         inner = Reader(item)
-        defaults = {"gaussian": (("stddev", 0.5),), "mitchell": (("A", 1 / 3), ("B", 1 / 3)), "lanczos": (("lobes", 3.0),), "tent": (("radius", 1.0),)}
-        for parameter, default in defaults.get(item.plugin, ()):
+        for parameter, default in FILTER_SETTINGS.get(item.plugin, {}).items():
             if not math.isclose(inner.number(parameter, default), default, rel_tol=1e-3):
                 raise inner.error(f"{parameter!r} must be Mitsuba's default, {default:g}: filters have no settings here", parameter)
         inner.finish()
@@ -121,11 +121,11 @@ def read_sensor(node: Node, context: Context) -> tuple[Sensor, Film, int]:
     lens_radius = focus = None
     if node.plugin == "thinlens":
         lens_radius = np.float32(reader.number("aperture_radius", above=0))
-        focus = np.float32(reader.number("focus_distance", 1.0, above=0))
+        focus = np.float32(reader.number("focus_distance", far, above=0))
     else:
         reader.ignore("focus_distance")
     reader.ignore("shutter_open", "shutter_close")
-    reader.finish(f"films: {', '.join(FILMS)}; samplers: {', '.join(SAMPLERS)}")
+    reader.finish((*FILMS, *SAMPLERS))
     sensor = Sensor(
         to_world[:3].astype(np.float32),
         np.linalg.inv(to_world)[:3].astype(np.float32),

@@ -1,12 +1,14 @@
 """Textures of a description as rows of the texture table; constant ones are plain colors."""
 
+import pathlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from renderer.scene.description import Node
+from renderer.errors import SceneError
+from renderer.scene.description import Node, listing, nearest
 from renderer.scene.reader import Reader
 from renderer.scene.spectra import COLORS, Rgb, color
 from renderer.textures.base import BILINEAR, BITMAP, CHECKERBOARD, CLAMP, MIRROR, NEAREST, REPEAT, Textures
@@ -48,7 +50,7 @@ class TextureTable:
     def __init__(self) -> None:
         self.rows: list[Row] = []
         self.of_node: dict[int, int] = {}
-        self.images: dict[tuple[str, bool], npt.NDArray[np.float32]] = {}
+        self.images: dict[tuple[pathlib.Path, bool], npt.NDArray[np.float32]] = {}
 
     def row(self, node: Node, context: "Context") -> int:
         """The row of a bitmap or checkerboard."""
@@ -61,16 +63,22 @@ class TextureTable:
 
     def bitmap(self, reader: Reader, context: "Context") -> Row:
         """An image file; ``raw`` says that its values are already linear."""
-        filename = reader.text("filename")
-        place = reader.node.properties["filename"].place
-        path = str(context.paths.find(filename, place))
+        path, _ = context.paths.file(reader)
         raw = reader.flag("raw", False)
         mode = FILTERS[reader.choice("filter_type", "bilinear", tuple(FILTERS))], WRAPS[reader.choice("wrap_mode", "repeat", tuple(WRAPS))]
         reader.ignore("format", "accel")
+        black = (0.0, 0.0, 0.0)
+        try:
+            pixels = self.image(path, raw)
+        except SceneError as error:
+            raise reader.error(str(error), "filename") from None
+        return Row(BITMAP, to_uv(reader), (black, black), pixels, mode)
+
+    def image(self, path: pathlib.Path, raw: bool) -> npt.NDArray[np.float32]:
+        """The pixels of an image file, read once."""
         if (path, raw) not in self.images:
             self.images[path, raw] = load_bitmap(path, raw)
-        black = (0.0, 0.0, 0.0)
-        return Row(BITMAP, to_uv(reader), (black, black), self.images[path, raw], mode)
+        return self.images[path, raw]
 
     def pack(self) -> Textures | None:
         """The texture table as kernels read it; None where there are no textures."""
@@ -121,9 +129,7 @@ def slot(reader: Reader, name: str, default: Rgb | float, context: "Context", bo
     return Slot(color(reader, name, default, bounded), -1)
 
 
-def unsupported_texture(reader: Reader, name: str, plugin: str) -> Exception:
+def unsupported_texture(reader: Reader, name: str, plugin: str) -> SceneError:
     """The error for a texture that is not supported."""
-    from renderer.scene.description import listing, nearest
-
     known: Sequence[str] = (*TEXTURES, *COLORS)
     return reader.error(f"{name!r}: the texture {plugin!r} is not supported{nearest(plugin, known)}; supported: {listing(known)}", name)

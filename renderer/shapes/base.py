@@ -9,7 +9,7 @@ from renderer.math.vec import Vec3
 
 SPHERE, DISK, CYLINDER = range(3)
 
-Index = int | np.integer[Any]  # a row of an array: an int in Python, any integer type in kernels
+Index = Any  # a row of an array: an int in Python, any integer type inside kernels
 
 
 class Quadrics(NamedTuple):

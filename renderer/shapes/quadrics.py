@@ -8,6 +8,8 @@ then keeps the accuracy of its float32 end points. A point is recorded as (u, v)
 - cylinder: u = phi / 2 pi, v = z, along the axis
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,7 +17,7 @@ from renderer.kernel import kernel
 from renderer.math.vec import ONE, Vec3, cross, dot, madd, scale
 from renderer.shapes.base import CYLINDER, DISK, SPHERE, Geometry, Hit, Index, Quadrics
 
-Vec3d = tuple[float, float, float]  # float64
+Vec3d = tuple[Any, Any, Any]  # three float64
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 TWO_PI_D = 2 * np.pi
@@ -23,7 +25,7 @@ PI_D = np.pi
 
 
 @kernel
-def transform_point(m: npt.NDArray[np.float64], i: Index, p: Vec3 | Vec3d) -> Vec3d:
+def transform_point(m: npt.NDArray[np.float64], i: Index, p: Vec3d) -> Vec3d:
     """Matrix i of (n, 3, 4) float64 times the point p."""
     return (
         m[i, 0, 0] * p[0] + m[i, 0, 1] * p[1] + m[i, 0, 2] * p[2] + m[i, 0, 3],
@@ -33,7 +35,7 @@ def transform_point(m: npt.NDArray[np.float64], i: Index, p: Vec3 | Vec3d) -> Ve
 
 
 @kernel
-def transform_vector(m: npt.NDArray[np.float64], i: Index, a: Vec3 | Vec3d) -> Vec3d:
+def transform_vector(m: npt.NDArray[np.float64], i: Index, a: Vec3d) -> Vec3d:
     """The linear part of matrix i of (n, 3, 4) float64 times the vector a."""
     return (
         m[i, 0, 0] * a[0] + m[i, 0, 1] * a[1] + m[i, 0, 2] * a[2],
@@ -43,7 +45,7 @@ def transform_vector(m: npt.NDArray[np.float64], i: Index, a: Vec3 | Vec3d) -> V
 
 
 @kernel
-def transform_normal(inverse: npt.NDArray[np.float64], i: Index, n: Vec3 | Vec3d) -> Vec3d:
+def transform_normal(inverse: npt.NDArray[np.float64], i: Index, n: Vec3d) -> Vec3d:
     """The transposed linear part of matrix i of (n, 3, 4) times n: a normal under the inverse of that matrix."""
     return (
         inverse[i, 0, 0] * n[0] + inverse[i, 1, 0] * n[1] + inverse[i, 2, 0] * n[2],
@@ -120,7 +122,7 @@ def intersect_disk(o: Vec3d, d: Vec3d) -> float:
     x = o[0] + t * d[0]
     y = o[1] + t * d[1]
     if t > 0.0 and x * x + y * y <= 1.0:
-        return t
+        return float(t)
     return np.inf
 
 

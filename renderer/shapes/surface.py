@@ -2,7 +2,7 @@
 
 A triangle's point comes from its barycentric weights, not from the ray: its rounding error is then a property of the
 triangle (``renderer.shapes.bounds``), whatever the length of the ray. The parameters are what the tables record, so
-``surface_at`` gives the same point, bit for bit.
+``surface_at`` gives the same point again.
 """
 
 import numpy as np
@@ -132,7 +132,7 @@ def surface(geometry: Geometry, primitive: Index, o: Vec3, d: Vec3, t: np.float3
 
 @kernel
 def surface_at(geometry: Geometry, primitive: Index, b1: np.float32, b2: np.float32) -> Hit:
-    """The point with the recorded parameters of a primitive: the same, bit for bit, as ``surface`` gave."""
+    """The point with the recorded parameters of a primitive: the same, to rounding, as ``surface`` gave."""
     return point_at(geometry.quadrics, geometry, primitive, b1, b2)
 
 

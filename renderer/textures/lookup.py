@@ -11,7 +11,7 @@ from renderer.kernel import kernel
 from renderer.math.vec import HALF, ONE, Vec3, madd, scale
 from renderer.textures.base import BITMAP, MIRROR, NEAREST, REPEAT, Textures
 
-Index = int | np.integer[Any]
+Index = Any  # a row of an array: an int in Python, any integer type inside kernels
 
 
 @kernel

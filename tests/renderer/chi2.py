@@ -42,7 +42,7 @@ class Chart:
         """The cell of each direction (n, 3)."""
         s, t, n = self.frame()
         phi = np.arctan2(directions @ t, directions @ s) / (2 * np.pi) % 1.0
-        c = np.clip(1.0 - directions @ n, 0.0, 2.0)
+        c = np.clip(0.5 * ((directions - n) ** 2).sum(axis=1), 0.0, 2.0)  # 1 - cos, without cancellation
         q = c / 2 if np.isinf(self.spread) else c / (c + self.spread) * (2 + self.spread) / 2
         column = np.minimum((phi * self.columns).astype(np.int64), self.columns - 1)
         row = np.minimum((q * self.rows).astype(np.int64), self.rows - 1)
@@ -70,19 +70,22 @@ class Chart:
 
 
 def chi_square_p_value(
-    directions: Array, total: int, pdf: Callable[[Array], Array], chart: Chart = Chart(), order: int = 6  # noqa: B008
+    directions: Array, total: int, pdf: Callable[[Array], Array], chart: Chart = Chart(), order: int = 6
 ) -> float:
     """P-value of "these directions are what ``total`` draws from ``pdf`` give", where draws without a direction are left out.
 
     Raises AssertionError where directions are not unit vectors, where a density is negative or not finite, where the densities add up
-    to more than 1, and where a sample lies in a cell that expects none.
+    to more than 1, where a sample lies in a cell that expects none, and where draws without a direction are not expected.
     """
     directions = np.asarray(directions, float)
-    assert np.allclose(np.linalg.norm(directions, axis=1), 1.0, atol=1e-4), "directions are not unit vectors"
+    length = np.linalg.norm(directions, axis=1, keepdims=True)
+    assert np.allclose(length, 1.0, atol=1e-4), "directions are not unit vectors"
+    directions = directions / length
 
     def checked(w: Array) -> Array:
         density = np.asarray(pdf(w), float)
-        assert np.all(np.isfinite(density)) and np.all(density >= 0), "densities must be finite and not negative"
+        assert np.all(np.isfinite(density)), "a density is not finite"
+        assert np.all(density >= 0), "a density is negative"
         return density
 
     expected = chart.integrate(checked, order) * total
@@ -90,13 +93,15 @@ def chi_square_p_value(
     assert expected.sum() < 1.005 * total, f"the density integrates to {expected.sum() / total}"
     # Rounding may carry a few samples over the edge of the density's domain
     assert observed[expected == 0].sum() <= 1e-5 * total, "samples where the density is zero"
-    return pooled_p_value(observed, expected, total)
+    # Draws without a direction are one more cell
+    missing, expected_missing = total - observed.sum(), max(0.0, total - expected.sum())
+    if expected_missing < MIN_EXPECTED:
+        assert missing <= MIN_EXPECTED + 10 * np.sqrt(MIN_EXPECTED), f"{missing} draws without a direction, {expected_missing} expected"
+    return pooled_p_value(np.append(observed, missing), np.append(expected, expected_missing))
 
 
-def pooled_p_value(observed: Array, expected: Array, total: int) -> float:
-    """P-value of cell counts; cells with small expectations are pooled, and draws that fell in no cell are one more cell."""
-    observed = np.append(observed, total - observed.sum())
-    expected = np.append(expected, max(0.0, total - expected.sum()))
+def pooled_p_value(observed: Array, expected: Array) -> float:
+    """P-value of cell counts; cells with small expectations are pooled."""
     order = np.argsort(expected, kind="stable")
     observed, expected = observed[order], expected[order]
 

@@ -33,7 +33,9 @@ def test_rejects_an_exponent_five_percent_off(chart: Chart) -> None:
 
 def test_rejects_missing_samples() -> None:
     directions = sample_power_cosine(1.0, 0)[: TOTAL - TOTAL // 100]
-    assert chi_square_p_value(directions, TOTAL, pdf_power_cosine(1.0)) < 1e-6
+    with pytest.raises(AssertionError, match="without a direction"):
+        chi_square_p_value(directions, TOTAL, pdf_power_cosine(1.0))
+    assert chi_square_p_value(directions, TOTAL, lambda w: 0.98 * pdf_power_cosine(1.0)(w)) < 1e-6
 
 
 def test_charts_integrate_the_sphere() -> None:
@@ -47,5 +49,6 @@ def test_refuses_directions_that_are_not_unit_vectors() -> None:
 
 
 def test_p_values_are_uniform() -> None:
-    p = np.sort([chi_square_p_value(sample_power_cosine(1.0, seed), TOTAL, pdf_power_cosine(1.0)) for seed in range(40)])
+    total, chart = 20_000, Chart(10, 20)
+    p = np.sort([chi_square_p_value(sample_power_cosine(1.0, seed)[:total], total, pdf_power_cosine(1.0), chart) for seed in range(40)])
     assert np.abs(p - (np.arange(40) + 0.5) / 40).max() < 0.28  # Kolmogorov-Smirnov, far below 1 %

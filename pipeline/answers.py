@@ -1,0 +1,60 @@
+"""Answers of ``queries`` as the command line gives them: rows on stdout, images as files."""
+
+import pathlib
+import sys
+
+import numpy as np
+
+from pipeline.errors import JobError
+from pipeline.files import clear_errors
+from pipeline.images import F32, write_exr, write_png
+from queries.images import aov_image, image
+from queries.lpe import compile
+from queries.run import Run, open_run
+from queries.sql import stream, write
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
+
+
+def print_rows(path: pathlib.Path, text: str, format: str) -> None:
+    """Run one SQL query and write its rows to stdout. Raises QueryError."""
+    with open_run(path) as run, stream(run, text) as reader:
+        write(reader, format, sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+
+
+def print_expression(path: pathlib.Path, text: str, out: pathlib.Path | None) -> None:
+    """Say how much light an expression selects, and write its image. Raises QueryError and JobError."""
+    expression = compile(text)
+    if out is not None and out.suffix not in (".exr", ".png"):
+        raise JobError(f"expected an image file that ends in .exr or .png, found `{out}`")
+    with open_run(path) as run:
+        selected, whole = aov_image(run, expression), image(run)
+        rows = run.connection.execute(f"SELECT count(*) FROM ({expression.sql(columns='p.path', light_words=run.light_words)})").fetchone()
+        total = run.connection.execute("SELECT count(*) FROM paths").fetchone()
+        if out is not None:
+            _write_image(out, selected, run, text)
+    for warning in expression.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    light, all_light = _mean_luminance(selected), _mean_luminance(whole)
+    print(f"{expression}: {expression.describe()}")
+    print(f"paths:     {rows[0] if rows else 0:,} of {total[0] if total else 0:,}")
+    print(f"mean:      {' '.join(f'{value:.6g}' for value in selected.mean(axis=(0, 1), dtype=np.float64))} (linear RGB)")
+    print(f"luminance: {light:.6g}, {100 * light / all_light if all_light else 0:.2f} % of the image")
+    if out is not None:
+        print(f"image:     {out}")
+
+
+def _write_image(path: pathlib.Path, pixels: F32, run: Run, expression: str) -> None:
+    with clear_errors("writing the image", path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix == ".png":
+            write_png(path, pixels)
+            return
+        settings = run.settings
+        known = {"job": run.manifest["name"], "expression": expression, "seed": str(settings["seed"]), "samples": str(settings["passes"])}
+        write_exr(path, pixels, known | {"version": run.manifest["versions"]["pathspace"]})
+
+
+def _mean_luminance(pixels: F32) -> float:
+    return float(pixels.mean(axis=(0, 1), dtype=np.float64) @ _LUMINANCE)

@@ -1,0 +1,198 @@
+"""The command line. Everything heavy is imported inside the command that needs it, so that ``--help`` is quick."""
+
+import contextlib
+import pathlib
+import signal
+import sys
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import Annotated, Any
+
+import typer
+
+from pipeline.errors import BAD_INPUT, FAILED, INTERRUPTED, PipelineError
+
+app = typer.Typer(name="pathspace", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
+
+ConfigArgument = Annotated[pathlib.Path, typer.Argument(metavar="CONFIG", help="The job: a YAML file.")]
+RunArgument = Annotated[pathlib.Path, typer.Argument(metavar="RUN", help="A run folder.")]
+OutOption = Annotated[
+    pathlib.Path | None, typer.Option("--out", metavar="DIR", help="The run folder (default: the job's `out`, else `runs/<name>`).")
+]
+SetOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the job, such as `render.samples=16`; repeatable.")
+]
+
+
+class Format(StrEnum):
+    """How rows are printed."""
+
+    table = "table"
+    csv = "csv"
+    json = "json"
+    arrow = "arrow"
+
+
+@app.callback()
+def pathspace() -> None:
+    """Render scenes in batches, keep every sampled light path as Arrow tables, and ask them about light."""
+
+
+@app.command()
+def run(
+    config: ConfigArgument,
+    out: OutOption = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with an interrupted run; damaged shards are rendered again.")] = False,
+    settings: SetOption = None,
+    threads: Annotated[int | None, typer.Option("--threads", min=1, max=4096, help="Worker threads (default: one for each core).")] = None,
+) -> None:
+    """Render a job into its run folder."""
+    with _clear_exit():
+        from pipeline.progress import log_to_stderr
+        from pipeline.stages import run_job
+
+        log_to_stderr()
+        signal.signal(signal.SIGTERM, _interrupt)
+        folder = run_job(config, settings or (), out, resume, threads)
+        typer.echo(f"image:  {folder.image('beauty', 'exr')}")
+        typer.echo(f"tables: {folder.path / 'tables'}")
+
+
+@app.command()
+def validate(config: ConfigArgument, out: OutOption = None, settings: SetOption = None) -> None:
+    """Check a job and its scene, and estimate its size on disk; nothing is written."""
+    with _clear_exit():
+        from pipeline.progress import log_to_stderr
+        from pipeline.stages import validate_job
+
+        log_to_stderr()
+        prepared, size = validate_job(config, settings or (), out)
+        chosen = prepared.settings
+        typer.echo(
+            f"{config} is a good job: {chosen.width} x {chosen.height} pixels, {chosen.passes} samples, method {chosen.method}; about {size.text()}"
+        )
+
+
+@app.command()
+def info(run: RunArgument) -> None:
+    """Say what a run folder holds."""
+    with _clear_exit():
+        from pipeline.summary import print_summary
+
+        print_summary(run)
+
+
+@app.command()
+def sql(
+    run: RunArgument,
+    query: Annotated[str, typer.Argument(metavar="QUERY", help='SQL, such as "SELECT count(*) FROM paths".')],
+    format: Annotated[Format, typer.Option("--format", help="How rows are printed.")] = Format.table,
+) -> None:
+    """Ask a run a question in SQL (DuckDB, read-only)."""
+    with _clear_exit():
+        from pipeline.answers import print_rows
+
+        print_rows(run, query, format.value)
+
+
+@app.command()
+def lpe(
+    run: RunArgument,
+    expression: Annotated[str, typer.Argument(metavar="EXPR", help='A light path expression, such as "C D .* L".')],
+    out: Annotated[
+        pathlib.Path | None, typer.Option("--out", metavar="IMAGE", help="Write the image of the light that the expression selects (EXR).")
+    ] = None,
+) -> None:
+    """Select light by a light path expression: its share of the image, and the image itself."""
+    with _clear_exit():
+        from pipeline.answers import print_expression
+
+        print_expression(run, expression, out)
+
+
+@app.command()
+def export(
+    run: RunArgument,
+    parquet: Annotated[pathlib.Path, typer.Option("--parquet", metavar="DIR", help="The folder to write Parquet files into.")],
+) -> None:
+    """Write a run's tables as Parquet files, which any DuckDB or Spark reads."""
+    with _clear_exit():
+        from queries.export import export_parquet
+        from queries.run import open_run
+
+        with open_run(run) as opened:
+            for name, rows in export_parquet(opened, parquet).items():
+                typer.echo(f"{parquet / name}.parquet: {rows:,} rows")
+
+
+@app.command()
+def bench(config: Annotated[pathlib.Path, typer.Argument(metavar="CONFIG", help="A benchmark: a YAML file.")]) -> None:
+    """Measure speed, size and error, and write a table and a chart."""
+    with _clear_exit():
+        import importlib
+
+        from pipeline.progress import log_to_stderr
+
+        log_to_stderr()
+        importlib.import_module("pipeline.bench").main(config)
+
+
+@contextlib.contextmanager
+def _clear_exit() -> Iterator[None]:
+    """Turn every failure into one message on stderr and an exit code; a traceback only where the fault is ours."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        _stop("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader of our output has gone, as `| head` does
+        raise typer.Exit(FAILED) from None
+    except PipelineError as error:
+        _stop(str(error), error.exit_code)
+    except Exception as error:
+        if not _is_bad_input(error):
+            _report_fault(error)
+        _stop(str(error), BAD_INPUT)
+
+
+def _is_bad_input(error: Exception) -> bool:
+    """Whether a package below says that its input was bad."""
+    from renderer.errors import SceneError
+
+    if isinstance(error, SceneError):
+        return True
+    from queries.errors import QueryError
+
+    return isinstance(error, QueryError)
+
+
+def _report_fault(error: Exception) -> None:
+    """A fault of the program: say where, keep the traceback for those who ask for it."""
+    import logging
+    import os
+    import traceback
+
+    if os.environ.get("PATHSPACE_TRACEBACK"):
+        traceback.print_exception(error)
+    logging.getLogger("pathspace").debug("fault", exc_info=error)
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    what = f"{type(error).__name__}: {error} ({pathlib.Path(where.filename).name}:{where.lineno})"
+    _stop(f"{what}. This is a fault of pathspace; PATHSPACE_TRACEBACK=1 shows more", FAILED)
+
+
+def _stop(message: str, code: int) -> None:
+    typer.echo(f"pathspace: {message}", err=True)
+    raise typer.Exit(code)
+
+
+def _interrupt(_signal: int, _frame: Any) -> None:
+    raise KeyboardInterrupt
+
+
+def main() -> None:
+    """The entry point of the console script."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,122 @@
+"""``docs/jobs.md``, generated from the schema: ``python -m pipeline.job_docs > docs/jobs.md``."""
+
+import json
+import re
+from typing import Any
+
+from pydantic import BaseModel
+
+from pipeline.config import Images, Job, Record, Render
+
+_SECTIONS: dict[str, type[BaseModel]] = {"render": Render, "record": Record, "images": Images}
+_EXAMPLE = """\
+name: cornell
+scene: scenes/cornell.yaml          # or a Mitsuba 3 .xml
+render:
+  method: path                      # or light
+  resolution: [256, 256]            # default: the scene's film
+  samples: 64
+  max_depth: 8                      # Mitsuba's meaning; -1 is unbounded
+  rr_depth: 5
+  seed: 7
+  sampler: sobol                    # or independent
+  filter: box
+record: {keep: all}
+aovs: {direct: "C D L", indirect: "C D .+ L"}
+"""
+
+
+def job_docs() -> str:
+    """The page, as Markdown."""
+    parts = [
+        "# Jobs",
+        "<!-- Generated from pipeline/config.py by `python -m pipeline.job_docs > docs/jobs.md`; a test compares the two. -->",
+        "A job is a YAML file. `pathspace run JOB` renders it, `pathspace validate JOB` checks it and estimates its size. Unknown keys are errors, "
+        "values are never converted silently, and every error names the file and the line. `--set render.samples=16` changes one key for one run: "
+        "dotted keys, values in YAML.",
+        f"```yaml\n{_EXAMPLE}```",
+        _table("The job", Job, ""),
+    ]
+    parts += [_table(f"`{name}`", section, f"{name}.") for name, section in _SECTIONS.items()]
+    parts += [
+        "## Rules",
+        "- Paths are relative to the job's file. `--out DIR` says where one run is written, whatever the job says.\n"
+        "- What makes a run the same run is its scene and its `render` and `record` settings: `--resume` goes on with it, also with other `aovs`.\n"
+        "- PNG images are for looking: linear values are multiplied by 2^exposure, clipped to 0 … 1 and given the sRGB curve. EXR images are linear.",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(title: str, model: type[BaseModel], prefix: str) -> str:
+    """One section's keys as a table."""
+    described = (model.__doc__ or "").strip()
+    lines = [f"## {title}", "", described, "", "| key | values | default | meaning |", "|---|---|---|---|"]
+    definitions = Job.model_json_schema().get("$defs", {})
+    for name, schema in model.model_json_schema()["properties"].items():
+        field = model.model_fields[name]
+        section = name in _SECTIONS and model is Job
+        default = (
+            "required"
+            if field.is_required()
+            else "see below"
+            if section
+            else "the scene's"
+            if field.default is None
+            else f"`{json.dumps(field.default)}`"
+        )
+        default = "`runs/<name>`" if name == "out" else default
+        values = "a section" if section else values_of(schema, definitions)
+        lines.append(f"| `{prefix}{name}` | {_cell(values)} | {_cell(default)} | {_cell(field.description or '')} |")
+    return "\n".join(lines)
+
+
+def values_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """What a JSON schema allows, in words."""
+    if "$ref" in schema:
+        return values_of(definitions[schema["$ref"].split("/")[-1]], definitions)
+    if "anyOf" in schema:
+        return " or ".join(values_of(choice, definitions) for choice in schema["anyOf"] if choice.get("type") != "null")
+    if "enum" in schema:
+        return ", ".join(f"`{value}`" for value in schema["enum"])
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    kind = schema.get("type")
+    if kind == "array":
+        if "prefixItems" in schema:
+            return "a list of " + str(len(schema["prefixItems"])) + f": {values_of(schema['prefixItems'][0], definitions)}"
+        return f"a list of {values_of(schema['items'], definitions)}"
+    if kind == "object":
+        inner = schema.get("additionalProperties")
+        return f"name: {values_of(inner, definitions)}" if isinstance(inner, dict) else "a section"
+    words = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true` or `false`"}
+    return words[str(kind)] + _bounds(schema)
+
+
+def _bounds(schema: dict[str, Any]) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if low is not None and high is not None:
+        return f" {_number(low)} … {_number(high)}"
+    if low is not None:
+        below = schema.get("exclusiveMaximum")
+        return f" {_number(low)} or more" + (f", below {_number(below)}" if below is not None else "")
+    if "pattern" in schema:
+        return f" of at most {schema['maxLength']} characters: letters, digits, `_`, `.`, `-`"
+    return ""
+
+
+def _number(value: float) -> str:
+    """A bound, with powers of two from 2^20 on written as such."""
+    whole = int(value)
+    for offset, text in ((0, ""), (1, " - 1")):
+        power = (whole + offset).bit_length() - 1
+        if whole + offset == 2**power and power >= 20:
+            return f"2^{power}{text}"
+    return f"{whole}"
+
+
+def _cell(text: str) -> str:
+    return re.sub(r"(?<!\\)\|", r"\\|", text)
+
+
+if __name__ == "__main__":
+    print(job_docs(), end="")

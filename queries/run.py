@@ -1,0 +1,165 @@
+"""Open a run: its tables memory-mapped, and read-only DuckDB views of them."""
+
+import json
+import os
+import pathlib
+import shutil
+import tempfile
+from types import TracebackType
+from typing import Any
+
+import duckdb
+import pyarrow as pa
+
+from queries.errors import RunError
+from queries.views import CATALOGUES, RECORDED, create_views
+
+MEMORY_LIMIT = "2GB"
+_LOCKED = {
+    # Nothing outside the connection can be reached: no files, no extensions, no Python variables.
+    "autoinstall_known_extensions": "false",
+    "autoload_known_extensions": "false",
+    "allow_community_extensions": "false",
+    "allow_persistent_secrets": "false",
+    "python_enable_replacements": "false",
+}
+
+
+class Run:
+    """An open run: a context manager.
+
+    ``path`` the folder, ``manifest`` its manifest, ``tables`` the stored Arrow tables by name (memory-mapped),
+    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which none sees another's changes.
+    """
+
+    def __init__(self, path: pathlib.Path, manifest: dict[str, Any], tables: dict[str, pa.Table], memory_limit: str, threads: int | None) -> None:
+        self.path = path
+        self.manifest = manifest
+        self.tables = tables
+        self.memory_limit = memory_limit
+        self.threads = threads
+        self._spill = pathlib.Path(tempfile.mkdtemp(prefix="pathspace-"))
+        self._connections: list[duckdb.DuckDBPyConnection] = []
+        self._own: duckdb.DuckDBPyConnection | None = None
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings that the run was traced with."""
+        settings: dict[str, Any] = self.manifest["settings"]
+        return settings
+
+    @property
+    def light_words(self) -> bool:
+        """Whether paths of this run use light walks."""
+        return "paths" in self.tables and "light_word" in self.tables["paths"].schema.names
+
+    @property
+    def connection(self) -> duckdb.DuckDBPyConnection:
+        """The run's own connection, made when first asked for."""
+        if self._own is None:
+            self._own = self.connect()
+        return self._own
+
+    def connect(self) -> duckdb.DuckDBPyConnection:
+        """A fresh connection: the views, and what a query makes in it; files, settings and extensions are out of reach."""
+        spill = self._spill / str(len(self._connections))
+        spill.mkdir()
+        config: dict[str, str | bool | int | float | list[str]] = {**_LOCKED, "memory_limit": self.memory_limit, "temp_directory": str(spill)}
+        if self.threads:
+            config["threads"] = str(self.threads)
+        connection = duckdb.connect(":memory:", config=config)
+        self._connections.append(connection)
+        create_views(connection, self.tables)
+        connection.execute("SET enable_external_access = false")
+        connection.execute("SET lock_configuration = true")
+        return connection
+
+    def close(self) -> None:
+        """Close all connections and remove what they spilled."""
+        for connection in self._connections:
+            connection.close()
+        self._own = None
+        self.tables = {}
+        shutil.rmtree(self._spill, ignore_errors=True)
+
+    def __enter__(self) -> "Run":
+        """The run itself."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Close."""
+        self.close()
+
+
+def open_run(path: str | os.PathLike[str], memory_limit: str = MEMORY_LIMIT, threads: int | None = None) -> Run:
+    """Open a finished run. Raises ``RunError`` where the folder is no run, is unfinished, or lacks or holds damaged files."""
+    folder = pathlib.Path(path)
+    manifest = _read_manifest(folder)
+    tables: dict[str, pa.Table] = {}
+    for name, files in _table_files(folder, manifest).items():
+        parts = [_map_table(folder / file, file, size) for file, size in files]
+        try:
+            tables[name] = pa.concat_tables(parts)
+        except pa.ArrowInvalid:
+            raise RunError(f"the shards of table `{name}` in `{folder}` have different columns: render the run again") from None
+    for name, rows in manifest.get("rows", {}).items():
+        found = tables[name].num_rows if name in tables else 0
+        if found != rows:
+            raise RunError(f"table `{name}` in `{folder}` has {found:,} rows, its manifest says {rows:,}: {_ADVICE}")
+    return Run(folder, manifest, tables, memory_limit, threads)
+
+
+_ADVICE = "run the job again with --resume, which renders damaged shards anew"
+
+
+def _read_manifest(folder: pathlib.Path) -> dict[str, Any]:
+    if not folder.is_dir():
+        raise RunError(f"expected a run folder, found {'a file' if folder.exists() else 'nothing'} at `{folder}`")
+    file = folder / "manifest.json"
+    try:
+        manifest = json.loads(file.read_bytes())
+    except FileNotFoundError:
+        raise RunError(f"`{folder}` is no run folder: it has no manifest.json. Make one with `pathspace run CONFIG --out {folder}`") from None
+    except (OSError, ValueError) as error:
+        raise RunError(f"`{file}` cannot be read ({error})") from None
+    if not isinstance(manifest, dict) or not isinstance(manifest.get("settings"), dict):
+        raise RunError(f"`{file}` is no manifest of a run: expected an object with `settings`")
+    if manifest.get("status") != "complete":
+        raise RunError(f"the run in `{folder}` is unfinished: run the job again with --resume")
+    return manifest
+
+
+def _table_files(folder: pathlib.Path, manifest: dict[str, Any]) -> dict[str, list[tuple[str, int]]]:
+    """The files of each table, in the shards' order, with the sizes that they must have."""
+    found: dict[str, list[tuple[str, int]]] = {}
+    try:
+        for shard in range(manifest["shards"]["count"]):
+            record = f"shards/{shard:05d}.json"
+            for file, known in json.loads((folder / record).read_bytes())["files"].items():
+                parts = pathlib.PurePosixPath(file).parts
+                if parts[0] == "tables" and parts[1] in RECORDED:
+                    found.setdefault(parts[1], []).append((file, known["bytes"]))
+        for name, known in manifest["catalogues"].items():
+            found[name] = [(f"tables/{name}.arrow", known["bytes"])]
+    except FileNotFoundError:
+        raise RunError(f"`{folder}` lacks {record}: {_ADVICE}") from None
+    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise RunError(f"what `{folder}` says of its files cannot be read ({type(error).__name__}: {error}): {_ADVICE}") from None
+    for name in CATALOGUES:
+        if name not in found:
+            raise RunError(f"`{folder}` has no catalogue `{name}`: {_ADVICE}")
+    return found
+
+
+def _map_table(file: pathlib.Path, name: str, size: int) -> pa.Table:
+    """One file as a memory-mapped table."""
+    try:
+        found = file.stat().st_size
+    except OSError as error:
+        raise RunError(f"`{file}` {'is missing' if isinstance(error, FileNotFoundError) else 'cannot be read'}: {_ADVICE}") from None
+    if found != size:
+        raise RunError(f"`{file}` is truncated or grown: expected {size:,} bytes, found {found:,}: {_ADVICE}")
+    try:
+        return pa.ipc.open_file(pa.memory_map(str(file))).read_all()
+    except (pa.ArrowException, OSError) as error:
+        raise RunError(f"`{file}` is damaged ({str(error).splitlines()[0]}): {_ADVICE}") from None

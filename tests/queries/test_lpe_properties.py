@@ -1,0 +1,123 @@
+"""Laws of light path expressions, on random ones: agreement with the plain matcher, algebra, printing, and bounded work."""
+
+import time
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from words import matches
+
+from queries.errors import ExpressionError
+from queries.lpe import compile
+from queries.lpe.parser import parse
+from queries.lpe.printer import show
+from queries.lpe.syntax import PathEvent
+
+FIXED = settings(max_examples=120, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+ATOMS = ["C", "L", "D", "S", "G", "s", ".", "R", "T", "V", "X", "'a'", "!'a'", "['a''b']", "[^'a']", "[DS]", "[^D]", "[^R]", "<RD>", "<TS'b'>", "<R.!'a'>",
+         "<.x>", "<[RT][^D]>", "<..'a''b'>", "<R..>", r"'o\'b'"]  # fmt: skip
+REPETITIONS = ["*", "+", "?", "{2}", "{0}", "{1,}", "{,2}", "{1,3}"]
+parts = st.recursive(
+    st.sampled_from(ATOMS),
+    lambda inner: st.one_of(
+        st.lists(inner, min_size=2, max_size=4).map("".join),
+        st.lists(inner, min_size=2, max_size=3).map(lambda found: f"({'|'.join(found)})"),
+        st.lists(inner, min_size=1, max_size=3).map(lambda found: f"[{''.join(found)}]"),
+        st.builds(lambda part, times: f"({part}){times}", inner, st.sampled_from(REPETITIONS)),
+    ),
+    max_leaves=8,
+)
+wholes = parts.map(lambda part: f"C{part}L")  # camera first, so that nothing is turned round
+combined = st.recursive(wholes, lambda inner: st.builds(lambda a, op, b: f"({a}){op}({b})", inner, st.sampled_from("|&-^"), inner), max_leaves=4)
+
+events = st.builds(
+    PathEvent,
+    st.sampled_from("RTVCL"),
+    st.sampled_from(["D", "G", "S", "s", None]),
+    st.lists(st.sampled_from(["a", "b", "c", "o'b"]), max_size=2, unique=True).map(tuple),
+)
+paths = st.lists(events, max_size=5).map(lambda inner: (PathEvent("C", None), *inner, PathEvent("L", None)))
+
+
+@FIXED
+@given(combined, st.lists(paths, min_size=4, max_size=8))
+def test_agrees_with_the_plain_matcher(text: str, words: list[tuple[PathEvent, ...]]) -> None:
+    compiled = compile(text)
+    for word in words:
+        assert compiled.accepts(word) == matches(parse(text).tree, word)
+
+
+@FIXED
+@given(wholes, wholes, paths)
+def test_combinations_partition(a: str, b: str, word: tuple[PathEvent, ...]) -> None:
+    in_a, in_b = compile(a).accepts(word), compile(b).accepts(word)
+    assert compile(f"{a}|{b}").accepts(word) == (in_a or in_b)
+    both, rest = compile(f"{a}&{b}").accepts(word), compile(f"{a}-{b}").accepts(word)
+    assert both == (in_a and in_b)
+    assert both + rest == in_a
+    assert compile(f"{a}^{b}").accepts(word) == (in_a != in_b)
+
+
+@FIXED
+@given(combined)
+def test_printing_and_parsing_are_inverse(text: str) -> None:
+    tree = parse(text).tree
+    assert parse(show(tree)).tree == tree
+    assert show(parse(show(tree)).tree) == show(tree)
+
+
+@FIXED
+@given(combined)
+def test_equal_languages_have_equal_automata(text: str) -> None:
+    once, twice = compile(text), compile(f"({text})|({text})")
+    np.testing.assert_array_equal(once.dfa.transitions, twice.dfa.transitions)
+    np.testing.assert_array_equal(once.dfa.accepting, twice.dfa.accepting)
+    assert compile(f"({text})-({text})").dfa.states == 1
+
+
+@FIXED
+@given(st.lists(st.sampled_from(["D", "S", "<RD>", "<TS'a'>", "G*", "(D|S)+", "(DS)?"]), min_size=1, max_size=5), paths)
+def test_light_first_is_the_same_expression_read_backward(items: list[str], word: tuple[PathEvent, ...]) -> None:
+    # (DS)? read backward is (SD)?
+    forward = "C" + "".join(items) + "L"
+    backward = "L" + "".join(item.replace("DS", "SD") for item in reversed(items)) + "E"
+    assert compile(forward).accepts(word) == compile(backward).accepts(word)
+
+
+@settings(max_examples=400, derandomize=True, deadline=None)
+@given(st.one_of(st.text(max_size=40), st.text("CDSLGRTVOBxsXE.*+?{}[]()<>|&^-!'\\,0123456789ab \n", max_size=40)))
+def test_random_text_is_compiled_or_refused(text: str) -> None:
+    try:
+        compiled = compile(text)
+    except ExpressionError as error:
+        assert 0 <= error.column <= len(text) + 1
+    else:
+        assert compiled.sql()
+        assert parse(show(compiled.tree)).tree == compiled.tree
+
+
+HEAVY = {
+    "nested repetition": "C" + "(" * 50 + "D" + "*)" * 50 + "L",
+    "multiplied repetition": "C(((.{1000}){1000}){1000})L",
+    "repeated nothing": "C" + "(" * 20 + ".{0}" + "){1000}" * 20 + "L",
+    "exponential automaton": "C.*D.{30}L",
+    "many optional": "C" + ".?" * 1000 + "L",
+    "thousands of alternatives": "|".join(f"C{'DSG'[i % 3] * (i % 40)}L" for i in range(600)),
+    "thousands of labels in one set": "C[" + "".join(f"'a{i}'" for i in range(2000)) + "]L",
+    "many labels": "|".join(f"C'a{i}'L" for i in range(40)),
+    "many combinations": "&".join(f"C.*{'DSG'[i % 3]}.{{{i % 7}}}L" for i in range(60)),
+    "long": "C" + "D" * 2900 + "L",
+    "too long": "C" + "D" * 19_000 + "L",
+}
+
+
+@pytest.mark.parametrize("text", HEAVY.values(), ids=HEAVY.keys())
+def test_heavy_expressions_end_soon(text: str) -> None:
+    start = time.process_time()
+    try:
+        compile(text).sql()
+    except ExpressionError as error:
+        assert "expression" in str(error) or "labels" in str(error)
+    assert time.process_time() - start < 30  # a guard against exponential work: the bounds themselves count steps, not seconds

@@ -1,0 +1,1 @@
+"""Small scenes as Mitsuba dictionaries, which both programs render."""
