@@ -64,6 +64,8 @@ def batches(connection: duckdb.DuckDBPyConnection, query: str | duckdb.Statement
 
 def _answer(connection: duckdb.DuckDBPyConnection, text: str) -> pa.RecordBatchReader:
     """Run all statements; the answer to the last."""
+    if any(0xD800 <= ord(character) < 0xE000 for character in text):
+        raise QueryError("expected SQL as Unicode text, found half of a surrogate pair")
     statements = connection.extract_statements(text)
     if not statements:
         raise QueryError("expected an SQL statement, found none")

@@ -77,7 +77,8 @@ class Tracer:
     def warm_up(self) -> float:
         """Compile all kernels, or load them from the disk cache, by tracing a few walks; the seconds it took."""
         start = time.perf_counter()
-        self.trace((0, min(self.settings.walks, WARM_UP_WALKS)), lambda _table, _batch: None, Film(self.settings.width, self.settings.height, self.settings.filter))
+        spread = np.linspace(0, self.settings.walks_per_pass - 1, WARM_UP_WALKS).astype(np.uint64)
+        self.trace(spread, lambda _table, _batch: None, Film(self.settings.width, self.settings.height, self.settings.filter))
         return time.perf_counter() - start
 
     def trace(self, walks: Walks, write: Write | None, film: Film | None) -> TraceCounts:

@@ -151,4 +151,3 @@ def _fold_light() -> str:
         f"SELECT DISTINCT state, {LIGHT_ROOT}::UBIGINT, state FROM emission UNION ALL SELECT l.start, s.word, b.next FROM light AS l "
         "JOIN steps AS s ON s.parent = l.word JOIN backward AS b ON b.state = l.state AND b.symbol = s.symbol"
     )
-

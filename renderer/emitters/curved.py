@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from renderer.emitters.base import AREA, AREA_CYLINDER, AREA_DISK, AREA_MESH, AREA_SPHERE, CDF_FIRST, NO_DIRECTION, DirectionSample, Emitters
 from renderer.emitters.cdf import sample_cdf
-from renderer.emitters.rectangle import area_direction, pdf_area, push_off
+from renderer.emitters.rectangle import area_direction, pdf_area
 from renderer.kernel import kernel
 from renderer.math.vec import BLACK, ONE, TWO, TWO_PI, ZERO, Vec3, dot, row, scale, sub, tangents, to_world
 from renderer.math.warp import sample_triangle
@@ -66,7 +66,7 @@ def sphere_of(quadrics: Quadrics | None, geometry: Geometry, primitive: Index) -
 def cone_of(quadrics: Quadrics | None, geometry: Geometry, primitive: Index, p: Vec3) -> tuple[np.float32, np.float32, Vec3]:
     """The cone in which ``p`` sees a sphere: sin² of its half angle, 1 - cos, and the unit axis from the center to p.
 
-    From inside, or from the surface, there is no cone: sin² is 0.
+    From inside, or from the surface, there is no cone: both are 0.
     """
     center, radius = sphere_of(quadrics, geometry, primitive)
     axis = sub(p, center)
@@ -118,25 +118,20 @@ def sample_curved(
     primitive, b1, b2 = area_parameters(emitters, emitter, u, v)
 
     # A sphere from outside: by solid angle
+    spread = ZERO
     if emitters.kind[emitter] == AREA_SPHERE:
         squared_sine, spread, axis = cone_of(geometry.quadrics, geometry, primitive, p)
-        if squared_sine > ZERO:
-            nt = geometry.p0.shape[0]
-            b1, b2 = cone_parameters(geometry.quadrics, primitive, squared_sine, spread, axis, u, v, nt)
-            hit = surface_at(geometry, primitive, b1, b2)
-            radiance = texture_rgb(textures, emitters.texture[emitter], row(emitters.rgb, emitter), hit.u, hit.v)
-            to_light = sub(hit.p, p)
-            distance = np.sqrt(dot(to_light, to_light))
-            d = scale(to_light, ONE / distance)
-            if dot(d, hit.ng) >= ZERO:
-                return NO_DIRECTION
-            pdf = select / (TWO_PI * spread)
-            return DirectionSample(np.int32(emitter), d, push_off(hit.p, hit.ng, hit.offset), distance, scale(radiance, ONE / pdf), pdf)
+        if spread > ZERO:
+            b1, b2 = cone_parameters(geometry.quadrics, primitive, squared_sine, spread, axis, u, v, geometry.p0.shape[0])
 
-    # All else: by area
+    # The point, as if sampled by area, then with the cone's density
     hit = surface_at(geometry, primitive, b1, b2)
     radiance = texture_rgb(textures, emitters.texture[emitter], row(emitters.rgb, emitter), hit.u, hit.v)
-    return area_direction(emitter, p, hit.p, hit.ng, hit.offset, radiance, select / emitters.scalar[emitter, AREA])
+    s = area_direction(emitter, p, hit.p, hit.ng, hit.offset, radiance, select / emitters.scalar[emitter, AREA])
+    if spread > ZERO and s.pdf > ZERO:
+        pdf = select / (TWO_PI * spread)
+        return DirectionSample(s.emitter, s.d, s.endpoint, s.distance, scale(radiance, ONE / pdf), pdf)
+    return s
 
 
 @kernel
@@ -155,8 +150,8 @@ def pdf_curved(
     if curved is None:
         return ZERO
     if emitters.kind[emitter] == AREA_SPHERE:
-        squared_sine, spread, _ = cone_of(geometry.quadrics, geometry, primitive, p)
-        if squared_sine > ZERO:
+        _, spread, _ = cone_of(geometry.quadrics, geometry, primitive, p)
+        if spread > ZERO:
             return select / (TWO_PI * spread) if cos_light > ZERO else ZERO
     return pdf_area(distance, cos_light, select / emitters.scalar[emitter, AREA])
 

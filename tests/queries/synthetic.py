@@ -33,6 +33,7 @@ OBJECTS = [("floor", "white"), ("wall", "white"), ("glass_ball", "glass"), ("lam
 EMITTERS = [("lamp_light", 3, "L"), ("sky", None, "B"), ("glow", 1, "O"), ("spot", None, "L")]
 SCATTERING = [event for event in EVENTS if event.key >= FIRST_SCATTERING]
 Letter = tuple[int, int]  # key of the event, object
+Tables = dict[str, list[dict[str, Any]]]  # rows by table
 
 
 @dataclass
@@ -111,7 +112,7 @@ def make_run(folder: pathlib.Path, method: str = "path", seed: int = 1, passes: 
         (folder / name).mkdir(parents=True)
     totals: dict[str, int] = {}
     for shard in range(shards):
-        tables: dict[str, list[dict[str, Any]]] = {}
+        tables: Tables = {}
         for walk in range(shard * per_shard, min(walks, (shard + 1) * per_shard)):
             _add_walk(run, tree, generator, walk, known, tables, film)
         files = {}
@@ -139,14 +140,19 @@ def make_run(folder: pathlib.Path, method: str = "path", seed: int = 1, passes: 
     return run
 
 
+def _letters(generator: random.Random, count: int) -> list[Letter]:
+    """Random interactions."""
+    return [(generator.choice(SCATTERING).key, generator.randrange(len(OBJECTS))) for _ in range(count)]
+
+
 def _add_walk(
-    run: SyntheticRun, tree: WordTree, generator: random.Random, walk: int, known: dict[str, Any], tables: dict[str, list[dict[str, Any]]], film: np.ndarray
+    run: SyntheticRun, tree: WordTree, generator: random.Random, walk: int, known: dict[str, Any], tables: Tables, film: np.ndarray
 ) -> None:
     """One walk: its vertices, and a few paths over its prefixes."""
     method = known["method"]
     raster = [np.float32(generator.uniform(0, known[size]) * (1 - 1e-6)).item() for size in ("width", "height")]
     _expose(film, raster, known)
-    letters = [(generator.choice(SCATTERING).key, generator.randrange(len(OBJECTS))) for _ in range(generator.choice([0, 1, 1, 2, 2, 3, 4]))]
+    letters = _letters(generator, generator.choice([0, 1, 1, 2, 2, 3, 4]))
     vertices = "light_vertices" if method == "light" else "camera_vertices"
     for depth, (event, thing) in enumerate(letters, start=1):
         place = dict.fromkeys(("x", "y", "z", "throughput_r", "throughput_g", "throughput_b"), float(depth))
@@ -156,7 +162,7 @@ def _add_walk(
         prefix = letters[:path]
         if prefix and generator.random() < 0.5:
             prefix = [*prefix[:-1], (generator.choice(SCATTERING).key, prefix[-1][1])]
-        other = [(generator.choice(SCATTERING).key, generator.randrange(len(OBJECTS))) for _ in range(generator.randrange(3))] if method == "both" else []
+        other = _letters(generator, generator.randrange(3)) if method == "both" else []
         emitter = generator.randrange(len(EMITTERS))
         camera, light = ([], prefix) if method == "light" else (prefix, other)
         row = {

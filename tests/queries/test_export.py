@@ -20,8 +20,8 @@ def test_parquet_holds_every_view(any_run: SyntheticRun, tmp_path: pathlib.Path)
     assert {file.name for file in (tmp_path / "out").iterdir()} == {f"{name}.parquet" for name in rows}
     assert {"camera_vertices", "light_vertices", "occluded", "words", "events", "objects", "emitters", "techniques", "triangles", "run"} < set(rows)
     for name, count in rows.items():
-        assert duckdb.sql(f"SELECT count(*) FROM '{tmp_path}/out/{name}.parquet'").fetchone() == (count,)
-    assert duckdb.sql(f"SELECT * FROM '{tmp_path}/out/paths.parquet'").fetchall() == expected
+        assert duckdb.execute(f"SELECT count(*) FROM '{tmp_path}/out/{name}.parquet'").fetchone() == (count,)
+    assert duckdb.execute(f"SELECT * FROM '{tmp_path}/out/paths.parquet'").fetchall() == expected
     assert pyarrow.parquet.ParquetFile(tmp_path / "out/paths.parquet").metadata.row_group(0).column(0).compression == "ZSTD"
 
 

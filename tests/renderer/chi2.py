@@ -69,9 +69,7 @@ class Chart:
         return (density * weight).sum(axis=(2, 3)).ravel()
 
 
-def chi_square_p_value(
-    directions: Array, total: int, pdf: Callable[[Array], Array], chart: Chart = Chart(), order: int = 6
-) -> float:
+def chi_square_p_value(directions: Array, total: int, pdf: Callable[[Array], Array], chart: Chart = Chart(), order: int = 6) -> float:
     """P-value of "these directions are what ``total`` draws from ``pdf`` give", where draws without a direction are left out.
 
     Raises AssertionError where directions are not unit vectors, where a density is negative or not finite, where the densities add up

@@ -53,7 +53,7 @@ def test_conductor_equals_mitsuba(eta: float, k: float) -> None:
     cos = np.linspace(0.001, 1, 300).astype(np.float32)
     out = np.empty(300, np.float32)
     conductor_many(cos, np.float32(eta), np.float32(k), out)
-    np.testing.assert_allclose(out, [mi.fresnel_conductor(float(c), complex(eta, k)) for c in cos], rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(out, [mi.fresnel_conductor(float(c), mi.Complex2f(eta, k)) for c in cos], rtol=1e-4, atol=1e-6)
     if k == 0 and eta > 1:
         dielectric = np.empty((300, 4), np.float32)
         dielectric_many(cos, np.float32(eta), dielectric)

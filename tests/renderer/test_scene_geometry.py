@@ -32,7 +32,7 @@ SHAPES = {
     "cylinder_ends": {"type": "cylinder", "p0": [1, 0, 0.5], "p1": [-0.5, 2, 1], "radius": 0.4, "flip_normals": True},
     "cylinder_both": {"type": "cylinder", "p0": [0, 0, 1], "p1": [0, 0, -1], "radius": 0.4, "to_world": EVEN},
     "cylinder_mirrored": {"type": "cylinder", "to_world": MIRROR},
-    "ply": {"type": "ply", "filename": "package:pyvista/examples/nut.ply"},
+    "ply": {"type": "ply", "filename": "package:pyvista/examples/sphere.ply"},
     "ply_facets": {"type": "ply", "filename": "package:pyvista/examples/airplane.ply", "face_normals": True, "to_world": MIRROR},
     "ply_smooth_flipped": {"type": "ply", "filename": "package:pyvista/examples/ant.ply", "flip_normals": True, "to_world": TURN},
 }

@@ -124,9 +124,9 @@ def two_different_sides(folder: Folder) -> Dict:
 
 
 def delta_lights(folder: Folder) -> Dict:
-    """Point, spot and directional lights on every shape of its own."""
+    """Point, spot and directional lights; the film's center is shifted."""
     return scene(
-        camera((0, 1.8, 4), (0, 0.5, 0)),
+        camera((0, 1.8, 4), (0, 0.5, 0), principal_point_offset_x=0.06, principal_point_offset_y=-0.04),
         5,
         ground=floor(diffuse(0.5, 0.45, 0.4)),
         bulb={"type": "point", "position": [-1.0, 1.8, 1.0], "intensity": rgb(3, 2, 1)},
@@ -176,7 +176,7 @@ def mesh_files(folder: Folder) -> Dict:
 
 
 def thin_lens(folder: Folder) -> Dict:
-    """Depth of field, clipping planes that cut through objects, a field of view along y, a shifted center, a film that is not square."""
+    """Depth of field, clipping planes that cut through objects, a field of view along y, a film that is not square."""
     sensor = camera(
         (0.3, 1.0, 3.4),
         (0, 0.6, 0),
@@ -189,8 +189,6 @@ def thin_lens(folder: Folder) -> Dict:
         far_clip=4.8,
         fov=42.0,
         fov_axis="y",
-        principal_point_offset_x=0.06,
-        principal_point_offset_y=-0.04,
     )
     balls = {f"ball{i}": shape("sphere", scale(0.35), move(-0.9 + 0.6 * i, 0.4, 1.2 - 0.8 * i), bsdf=diffuse(0.3 + 0.2 * i, 0.5, 0.7)) for i in range(4)}
     return scene(sensor, 5, ground=floor(two_sided(diffuse(0.5, 0.5, 0.5))), lamp=lamp(5, 5, 5, 1.0, 3.0), **balls)
