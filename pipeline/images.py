@@ -40,7 +40,7 @@ def tone_map(image: F32, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
 
     The curve is 12.92 x below 0.0031308 and 1.055 x^(1/2.4) - 0.055 above; there is no shoulder, so that a value can be read back.
     """
-    x = np.clip(np.nan_to_num(image.astype(np.float64)) * 2.0**exposure, 0.0, 1.0)
+    x = np.clip(np.nan_to_num(image.astype(np.float64), posinf=np.inf, neginf=-np.inf) * 2.0**exposure, 0.0, 1.0)
     curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
     rounded: npt.NDArray[np.uint8] = np.round(curve * 255.0).astype(np.uint8)
     return rounded

@@ -131,6 +131,10 @@ class RunFolder:
     def _shard_record(self, shard: Shard) -> pathlib.Path:
         return self.path / "shards" / f"{shard.name}.json"
 
+    def finished_shards(self) -> int:
+        """How many shards say that they are finished, unchecked."""
+        return sum(1 for _ in (self.path / "shards").glob("*.json"))
+
     def write_shard(self, shard: Shard, counts: dict[str, int], files: dict[pathlib.Path, FileRecord]) -> None:
         """Say that a shard is finished: the last file to be written of it."""
         named = {path.relative_to(self.path).as_posix(): record.as_json() for path, record in sorted(files.items())}

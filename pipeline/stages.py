@@ -1,6 +1,7 @@
 """A run, stage by stage: compile the scene, trace, sum the film, write catalogues and images, compute the AOVs."""
 
 import contextlib
+import functools
 import os
 import pathlib
 import resource
@@ -21,7 +22,6 @@ from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
 from pipeline.shards import Shard, plan_shards, shard_size
-from renderer.accelerators import Accelerators
 from renderer.film import Film
 from renderer.trace import Tracer
 
@@ -92,6 +92,8 @@ class Run:
     def go(self) -> None:
         """All stages, in order."""
         summed = film_sum.load_film(self.folder, self.film, _record(self.manifest["film"]))
+        if self.folder.finished_shards() < len(self.shards):
+            self._refuse_too_large()
         with self.watch.stage("verify"):
             missing = self._missing_shards(film_needed=not summed)
         if missing:
@@ -150,6 +152,23 @@ class Run:
 
     # --- rendering ------------------------------------------------------------------------------------------------
 
+    @functools.cached_property
+    def tracer(self) -> Tracer:
+        """The first tracer; its kernels are compiled, or loaded, when it is asked for."""
+        with self.watch.stage("kernels"):
+            LOG.info("loading kernels (compiled on the first run, up to a minute) …")
+            tracer = Tracer(self.scene, self.settings)
+            tracer.warm_up()
+        return tracer
+
+    def _refuse_too_large(self) -> None:
+        """Estimate the size of the run, and refuse it before anything is written if it cannot fit."""
+        tracer = self.tracer
+        with self.watch.stage("estimate"):
+            size = estimate_size(tracer, self.settings)
+            LOG.info("%d walks, about %s", self.settings.walks, size.text())
+            refuse_too_large(size, self.folder)
+
     def _missing_shards(self, film_needed: bool) -> list[Shard]:
         """The shards that must be rendered; those that were whole once are named."""
         self._save()
@@ -165,20 +184,11 @@ class Run:
         return missing
 
     def _render(self, missing: list[Shard]) -> None:
-        """Compile kernels, check that the run fits, trace and write what is missing."""
+        """Trace and write what is missing."""
         self._check_version(len(missing) < len(self.shards))
-        with self.watch.stage("kernels"):
-            accelerators = Accelerators(self.scene)
-            first = Tracer(self.scene, self.settings, accelerators)
-            LOG.info("loading kernels (compiled on the first run, up to a minute) …")
-            first.warm_up()
-        with self.watch.stage("estimate"):
-            size = estimate_size(first, self.settings)
-            LOG.info("%d walks, about %s", self.settings.walks, size.text())
-            refuse_too_large(size, self.folder)
-        threads = max(1, min(self.threads, len(missing)))
-        tracers: list[Callable[[], Tracer]] = [lambda: first]
-        tracers += [lambda: Tracer(self.scene, self.settings, accelerators)] * (threads - 1)
+        first = self.tracer
+        others = max(1, min(self.threads, len(missing))) - 1
+        tracers: list[Callable[[], Tracer]] = [lambda: first, *[lambda: Tracer(self.scene, self.settings, first.accelerators)] * others]
         walks = sum(shard.count for shard in missing)
         seconds = self.watch.seconds.get("render", 0.0)
         try:

@@ -6,6 +6,9 @@ of the scene is ``None`` where a scene lacks it, and a callee that opens with ``
 rest of its body at compile time.
 
 numba's disk cache does not notice an edited callee, so its folder is named after a hash of all kernel sources.
+
+Kernels neither allocate nor own arrays, so they are compiled without numba's reference counts (``_nrt=False``): handing a
+scene's arrays to a callee would otherwise cost one atomic operation for each array and call, and keep LLVM from inlining.
 """
 
 import hashlib
@@ -29,6 +32,8 @@ def cache_folder() -> pathlib.Path:
         digest.update(text.encode())
     package = pathlib.Path(__file__).parent
     for source in sorted(package.rglob("*.py")):
+        if source.parent.name == "scene" and source.name != "arrays.py":
+            continue  # the scene's compiler runs in plain Python
         digest.update(source.relative_to(package).as_posix().encode())
         digest.update(source.read_bytes())
     return pathlib.Path(root) / f"kernels-{digest.hexdigest()[:16]}"

@@ -59,10 +59,14 @@ def mark_recorded(walk: npt.NDArray[np.uint64], n: int, threshold: np.uint64, re
 class Tracer:
     """Traces walks of one scene with one estimator. One for each thread: it owns the tile's buffers.
 
-    ``accelerators`` may be shared between threads; without it, the tracer builds its own.
+    ``accelerators`` may be shared between threads; without it, the tracer builds its own. Raises ValueError where the
+    settings' film is not the scene's: kernels would write outside of it.
     """
 
     def __init__(self, scene: Scene, settings: TraceSettings, accelerators: Accelerators | None = None, tile: int = TILE) -> None:
+        sensor = scene.arrays.sensor
+        if (sensor.width, sensor.height) != (settings.width, settings.height):
+            raise ValueError(f"settings of a {settings.width} x {settings.height} film, but the scene's is {sensor.width} x {sensor.height}")
         self.scene = scene
         self.settings = settings
         self.accelerators = accelerators or Accelerators(scene)

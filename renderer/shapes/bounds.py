@@ -24,7 +24,8 @@ def triangle_offsets(p0: npt.NDArray[np.float32], e1: npt.NDArray[np.float32], e
        product of absolute values over |e1 x e2| (large for slivers). It multiplies points of the triangle, whose
        distance from p0 is at most |e1| + |e2|: gamma(5) k·(|e1| + |e2|).
 
-    At grazing angles a ray's own slope is uncertain by the same order: all is taken four times.
+    At grazing angles a ray's own slope is uncertain by the same order: all is taken four times. Planes through the
+    origin along the axes have no error at all; a ray must leave them too, since a hit at distance zero is a hit.
     """
     a, b, c = (np.abs(np.asarray(x, np.float64)) for x in (p0, e1, e2))
     cross = np.cross(np.asarray(e1, np.float64), np.asarray(e2, np.float64))
@@ -32,7 +33,8 @@ def triangle_offsets(p0: npt.NDArray[np.float32], e1: npt.NDArray[np.float32], e
     normal = np.abs(cross) / length
     spread = np.stack([b[:, i] * c[:, j] + b[:, j] * c[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1) / length
     bound = gamma(9) * np.sum(normal * (a + b + c), axis=1) + gamma(5) * np.sum(spread * (b + c), axis=1)
-    return np.asarray(np.minimum(4 * bound, np.finfo(np.float32).max), np.float32)
+    least = UNIT**2 * np.max(a + b + c, axis=1)
+    return np.asarray(np.clip(4 * bound, least, np.finfo(np.float32).max), np.float32)
 
 
 def quadric_offsets(to_world: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:

@@ -44,7 +44,7 @@ def write_job(folder: pathlib.Path, **changes: Any) -> pathlib.Path:
     for key, value in changes.items():
         job[key] = {**job.get(key, {}), **value} if isinstance(value, dict) and key in ("render", "record") else value
     path = folder / "tiny.yaml"
-    path.write_text(yaml.safe_dump(job))
+    path.write_text(yaml.safe_dump(job, sort_keys=False))
     return path
 
 

@@ -292,7 +292,7 @@ def one_of_each_kind() -> list[list[float]]:
 
 def test_kernels_run_as_plain_python() -> None:
     """Without the compiler, wrong indices and names raise; the numbers stay."""
-    code = "import sys, json, numpy; sys.path.insert(0, sys.argv[1]); numpy.seterr(all='ignore'); test_bsdfs as t; "
+    code = "import sys, json, numpy; sys.path.insert(0, sys.argv[1]); numpy.seterr(all='ignore'); import test_bsdfs as t; "
     code += "print(json.dumps(t.one_of_each_kind()))"
     command = [sys.executable, "-c", code, os.path.dirname(__file__)]
     done = subprocess.run(command, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}, capture_output=True, text=True, check=False)

@@ -7,7 +7,7 @@ import pytest
 
 from renderer.scene.load import load_scene
 from tests.renderer.scene_parity import compare
-from tests.scenes.files import write_obj
+from tests.scenes.files import write_obj, write_ply
 
 ROOT = pathlib.Path(__file__).parents[2]
 TURN = [{"scale": [1.5, 0.7, 1.1]}, {"rotate": {"axis": [1, 2, 0.5], "angle": 50}}, {"translate": [0.3, -1, 2]}]
@@ -32,9 +32,8 @@ SHAPES = {
     "cylinder_ends": {"type": "cylinder", "p0": [1, 0, 0.5], "p1": [-0.5, 2, 1], "radius": 0.4, "flip_normals": True},
     "cylinder_both": {"type": "cylinder", "p0": [0, 0, 1], "p1": [0, 0, -1], "radius": 0.4, "to_world": EVEN},
     "cylinder_mirrored": {"type": "cylinder", "to_world": MIRROR},
-    "ply": {"type": "ply", "filename": "package:pyvista/examples/sphere.ply"},
     "ply_facets": {"type": "ply", "filename": "package:pyvista/examples/airplane.ply", "face_normals": True, "to_world": MIRROR},
-    "ply_smooth_flipped": {"type": "ply", "filename": "package:pyvista/examples/ant.ply", "flip_normals": True, "to_world": TURN},
+    "ply_smooth_flipped": {"type": "ply", "filename": "package:pyvista/examples/airplane.ply", "flip_normals": True, "to_world": TURN},
 }
 
 
@@ -56,9 +55,14 @@ def test_obj_is_mitsubas(change: dict, normals: bool, session_folder: pathlib.Pa
     compare(load_scene(one_shape({"type": "obj", "filename": path, **change})), 300, 3)
 
 
+@pytest.mark.parametrize("flip", [True, False])
+def test_ply_with_normals_and_coordinates_is_mitsubas(flip: bool, session_folder: pathlib.Path) -> None:
+    compare(load_scene(one_shape({"type": "ply", "filename": write_ply(session_folder), "to_world": MIRROR, "flip_normals": flip})), 300, 5)
+
+
 @pytest.mark.parametrize("name", ["cornell", "spheres", "veach_mis", "sky"])
 def test_shipped_scene_is_the_same_in_mitsuba(name: str) -> None:
-    compare(load_scene(ROOT / "configs" / "scenes" / f"{name}.yaml"), 1500, 11, tangents=False)
+    compare(load_scene(ROOT / "configs" / "scenes" / f"{name}.yaml"), 1500, 11, tangents=False, from_camera=True)
 
 
 def test_cornell_box_fits_the_published_corners() -> None:
