@@ -112,14 +112,22 @@ def merged_words(folder: RunFolder, shards: tuple[Shard, ...]) -> pa.Table:
         rows = np.empty(table.num_rows, _WORD)
         for name in _WORD.names or ():
             rows[name] = table[name].to_numpy()
-        merged = np.unique(np.concatenate([merged, rows]))
-    same = np.flatnonzero(merged["word"][1:] == merged["word"][:-1])
-    if len(same):
-        raise RunFolderError(
-            f"two different prefixes of walks share the word {merged['word'][same[0]]:#x} (a collision of 64-bit hashes): "
-            "the tables cannot tell them apart. Lower render.max_depth, or name fewer objects"
-        )
+        merged = _distinct(np.concatenate([merged, rows]))
     return _words(merged)
+
+
+def _distinct(rows: Any) -> Any:
+    """Rows of ``_WORD`` sorted by word, each word once."""
+    rows = rows[np.argsort(rows["word"], kind="stable")]
+    again = np.concatenate([[False], rows["word"][1:] == rows["word"][:-1]])
+    for name in ("parent", "event", "object"):
+        clash = np.flatnonzero(again[1:] & (rows[name][1:] != rows[name][:-1]))
+        if len(clash):
+            raise RunFolderError(
+                f"two different prefixes of walks share the word {rows['word'][clash[0]]:#x} (a collision of 64-bit hashes): "
+                "the tables cannot tell them apart. Lower render.max_depth, or name fewer objects"
+            )
+    return rows[~again]
 
 
 def _words(rows: Any) -> pa.Table:

@@ -126,7 +126,11 @@ def export(
 
 
 @app.command()
-def bench(config: Annotated[pathlib.Path, typer.Argument(metavar="CONFIG", help="A benchmark: a YAML file.")]) -> None:
+def bench(
+    config: Annotated[pathlib.Path, typer.Argument(metavar="CONFIG", help="A benchmark: a YAML file.")],
+    out: Annotated[pathlib.Path | None, typer.Option("--out", metavar="DIR", help="The folder of the results.")] = None,
+    settings: SetOption = None,
+) -> None:
     """Measure speed, size and error, and write a table and a chart."""
     with _clear_exit():
         import importlib
@@ -134,7 +138,9 @@ def bench(config: Annotated[pathlib.Path, typer.Argument(metavar="CONFIG", help=
         from pipeline.progress import log_to_stderr
 
         log_to_stderr()
-        importlib.import_module("pipeline.bench").main(config)
+        code = importlib.import_module("pipeline.bench").main(config, out, settings or ())
+        if code:
+            raise typer.Exit(code)
 
 
 @contextlib.contextmanager
@@ -142,6 +148,8 @@ def _clear_exit() -> Iterator[None]:
     """Turn every failure into one message on stderr and an exit code; a traceback only where the fault is ours."""
     try:
         yield
+    except typer.Exit:
+        raise
     except KeyboardInterrupt:
         _stop("interrupted", INTERRUPTED)
     except BrokenPipeError:

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import psutil
 import pyarrow as pa
 
 from pipeline.errors import JobError
 from pipeline.run_folder import RunFolder
-from pipeline.shards import plan_shards
+from pipeline.shards import shard_count, shard_size
 from renderer.settings import TraceSettings
 from renderer.trace import Tracer
 
@@ -44,11 +45,10 @@ def estimate_size(tracer: Tracer, settings: TraceSettings) -> SizeEstimate:
             measured[table] += batch.nbytes
 
     tracer.trace(ids, measure, None)
-    shards = plan_shards(settings.walks)
     rows = settings.height
     if settings.method == "path":  # a shard reaches a band of the film, and its filter a little more
-        rows = min(rows, shards[0].count // settings.width + 10)
-    film = len(shards) * rows * settings.width * 4 * 8
+        rows = min(rows, shard_size(settings.walks) // settings.width + 10)
+    film = shard_count(settings.walks) * film_bytes(settings) * rows // settings.height
     return SizeEstimate({name: round(size * settings.walks / len(ids)) for name, size in measured.items()}, film)
 
 
@@ -68,6 +68,21 @@ def refuse_too_large(size: SizeEstimate, folder: RunFolder) -> None:
         raise JobError(
             f"the run needs about {size.text()}, and {human_bytes(free)} are free at `{folder.path}`: "
             "lower render.samples or render.resolution, set record.keep to `none` or a fraction, or choose another disk with --out"
+        )
+
+
+def film_bytes(settings: TraceSettings) -> int:
+    """Memory of one film: four float64 sums a pixel."""
+    return settings.width * settings.height * 4 * 8
+
+
+def refuse_too_much_memory(settings: TraceSettings, threads: int) -> None:
+    """Raise JobError, with the figures, where the films (one for each thread, and their sum) cannot fit into memory."""
+    needed, free = (threads + 1) * film_bytes(settings), psutil.virtual_memory().available
+    if needed > free:
+        raise JobError(
+            f"a film of {settings.width} x {settings.height} pixels needs {human_bytes(needed)} of memory on {threads} threads, "
+            f"and {human_bytes(free)} are free: lower render.resolution or --threads"
         )
 
 

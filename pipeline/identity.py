@@ -16,7 +16,7 @@ from renderer.kernel import cache_folder
 from renderer.scene.arrays import Scene
 from renderer.settings import UNBOUNDED_DEPTH, TraceSettings
 
-MAX_WALKS = 2**48
+MAX_WALKS = 2**40
 _PACKAGES = ("pathspace", "numpy", "numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "pyarrow", "duckdb", "scipy")
 
 

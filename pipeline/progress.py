@@ -30,7 +30,7 @@ class Progress:
         rate = self.done / elapsed
         left = (self.total - self.done) / rate if rate > 0 else float("inf")
         share = 100.0 * self.done / self.total if self.total else 100.0
-        return f"{self.title}: {share:.0f} %, {rate:,.0f} {self.unit}/s, {_duration(left)} left"
+        return f"{self.title}: {share:.0f} %, {_rate(rate, self.unit)}, {_duration(left)} left"
 
 
 class _LogProgress(Progress):
@@ -59,7 +59,7 @@ class _BarProgress(Progress):
     def advance(self, amount: int) -> None:
         super().advance(amount)
         rate = self.done / max(time.perf_counter() - self.start, 1e-9)
-        self._bar.update(self._task, completed=self.done, rate=f"{rate:,.0f} {self.unit}/s")
+        self._bar.update(self._task, completed=self.done, rate=_rate(rate, self.unit))
 
 
 @contextlib.contextmanager
@@ -99,6 +99,10 @@ def log_to_stderr(quiet: bool = False) -> None:
     LOG.handlers[:] = [handler]
     LOG.setLevel(logging.DEBUG)
     LOG.propagate = False
+
+
+def _rate(rate: float, unit: str) -> str:
+    return f"{rate:,.0f} {unit}/s" if rate >= 10 else f"{rate:.2g} {unit}/s"
 
 
 def _duration(seconds: float) -> str:

@@ -35,6 +35,11 @@ def shard_size(walks: int) -> int:
     return size
 
 
+def shard_count(walks: int) -> int:
+    """How many shards a job of ``walks`` walks has."""
+    return -(-walks // shard_size(walks))
+
+
 def plan_shards(walks: int) -> tuple[Shard, ...]:
     """All the shards of a job of ``walks`` walks, in order."""
     size = shard_size(walks)

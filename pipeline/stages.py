@@ -14,14 +14,14 @@ from typing import Any
 
 from pipeline import catalogues, film_sum, images
 from pipeline.errors import JobError, RunFolderError
-from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large
+from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large, refuse_too_much_memory
 from pipeline.executor import render_shards
 from pipeline.files import FileRecord, checksum, clear_errors
 from pipeline.identity import camera, differences, renderer_version, settings_as_json, versions
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
-from pipeline.shards import Shard, plan_shards, shard_size
+from pipeline.shards import Shard, plan_shards, shard_count, shard_size
 from renderer.film import Film
 from renderer.trace import Tracer
 
@@ -57,6 +57,7 @@ def default_threads() -> int:
 def validate_job(path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib.Path | None = None) -> tuple[PreparedJob, SizeEstimate]:
     """Check a job as ``run`` would, and estimate its size; nothing is written. Raises JobError and SceneError."""
     prepared = prepare_job(path, overrides)
+    refuse_too_much_memory(prepared.settings, default_threads())
     size = estimate_size(Tracer(prepared.scene, prepared.settings), prepared.settings)
     refuse_too_large(size, RunFolder(prepared.loaded.run_folder(out)))
     return prepared, size
@@ -69,10 +70,12 @@ def run_job(
     watch = Stopwatch()
     with watch.stage("scene"):
         prepared = prepare_job(path, overrides)
+    threads = threads or default_threads()
+    refuse_too_much_memory(prepared.settings, threads)
     folder = RunFolder(prepared.loaded.run_folder(out))
     with folder.locked(), clear_errors("running the job", folder.path), log_file(folder.path / "log.txt"):
         try:
-            Run(prepared, folder, watch, threads or default_threads(), resume).go()
+            Run(prepared, folder, watch, threads, resume).go()
         except BaseException as error:
             LOG.debug("stopped: %s", error)
             raise
@@ -85,14 +88,13 @@ class Run:
     def __init__(self, prepared: PreparedJob, folder: RunFolder, watch: Stopwatch, threads: int, resume: bool) -> None:
         self.prepared, self.folder, self.watch, self.threads = prepared, folder, watch, threads
         self.job, self.settings, self.scene = prepared.loaded.job, prepared.settings, prepared.scene
-        self.shards = plan_shards(self.settings.walks)
         self.film = Film(self.settings.width, self.settings.height, self.settings.filter)
         self.manifest = self._manifest(self._same_run(resume))
 
     def go(self) -> None:
         """All stages, in order."""
         summed = film_sum.load_film(self.folder, self.film, _record(self.manifest["film"]))
-        if self.folder.finished_shards() < len(self.shards):
+        if self.folder.finished_shards() < shard_count(self.settings.walks):
             self._refuse_too_large()
         with self.watch.stage("verify"):
             missing = self._missing_shards(film_needed=not summed)
@@ -143,7 +145,7 @@ class Run:
             "camera": camera(self.scene),
             "versions": old.get("versions") or versions(),
             "warnings": list(self.scene.warnings),
-            "shards": {"count": len(self.shards), "walks": shard_size(self.settings.walks)},
+            "shards": {"count": shard_count(self.settings.walks), "walks": shard_size(self.settings.walks)},
             "film": old.get("film"),
             "catalogues": old.get("catalogues", {}),
             "images": old.get("images", {}),
@@ -151,6 +153,11 @@ class Run:
         }
 
     # --- rendering ------------------------------------------------------------------------------------------------
+
+    @functools.cached_property
+    def shards(self) -> tuple[Shard, ...]:
+        """All shards of the run; there may be many, so they are listed once the run's size was checked."""
+        return plan_shards(self.settings.walks)
 
     @functools.cached_property
     def tracer(self) -> Tracer:

@@ -247,5 +247,3 @@ BUILDERS: dict[str, Callable[[Reader, Context], Material]] = {
     "plastic": plastic,
     "roughplastic": rough_plastic,
 }
-
-

@@ -90,10 +90,14 @@ def sort_parts(root: Node) -> dict[str, list[Node]]:
     """The scene's children by kind; unknown ones are an error. Textures and BSDFs stand there to be referenced."""
     kinds: dict[str, Any] = {"shapes": SHAPES, "emitters": EMITTERS, "sensors": SENSORS, "integrators": INTEGRATORS}
     parts: dict[str, list[Node]] = {kind: [] for kind in kinds}
+    seen: set[int] = set()
     for key, value in root.properties.items():
         node = value.data
         if not isinstance(node, Node):
             raise SceneError(f"scene: unknown property {key!r}; a scene holds objects only", value.place)
+        if id(node) in seen:  # an alias
+            continue
+        seen.add(id(node))
         kind = next((kind for kind, plugins in kinds.items() if node.plugin in plugins), None)
         if kind is not None:
             parts[kind].append(node)

@@ -64,6 +64,7 @@ class Definitions:
     def __init__(self, root: Node) -> None:
         """Collect the named nodes below the root; a name that is defined twice is an error."""
         self.nodes: dict[str, Node] = {}
+        self.aliases = {key: value.data.id for key, value in root.properties.items() if isinstance(value.data, Reference)}
         self._collect(root)
 
     def _collect(self, node: Node) -> None:
@@ -75,7 +76,13 @@ class Definitions:
             self._collect(child)
 
     def find(self, reference: Reference, place: str) -> Node:
-        """The node that a reference names."""
+        """The node that a reference names, through aliases."""
+        seen: list[str] = []
+        while reference.id in self.aliases and reference.id not in self.nodes:
+            seen.append(reference.id)
+            reference = Reference(self.aliases[reference.id])
+            if reference.id in seen:
+                raise SceneError(f"a cycle of references: {' -> '.join(map(repr, (*seen, reference.id)))}", place)
         if reference.id not in self.nodes:
             known = f"; known ids: {listing(sorted(self.nodes))}" if 0 < len(self.nodes) <= 20 else ""
             raise SceneError(f"nothing has the id {reference.id!r}{nearest(reference.id, self.nodes) or known}", place)
@@ -100,8 +107,8 @@ def resolve(root: Node) -> set[str]:
         for key, value in node.properties.items():
             data = value.data
             if isinstance(data, Reference):
-                used.add(data.id)
                 data = definitions.find(data, value.place)
+                used.add(data.name)
                 node.properties[key] = Value(data, value.place)
             if isinstance(data, Node):
                 visit(data, (*above, node))

@@ -152,7 +152,7 @@ class XmlReader:
                 self.include(node, child, files, depth)
             elif child.tag == "alias":
                 self.alias(node, child)
-            elif child.tag in OBJECTS[1:]:
+            elif child.tag in OBJECTS[1:] or (child.tag == "spectrum" and "type" in child.attributes):
                 inner = self.object(child, files, depth + 1)
                 self.put(node, child.attributes.get("name"), Value(inner, child.place), inner.name)
             elif child.tag in VALUES:
@@ -271,6 +271,8 @@ class XmlReader:
             if element.tag == "scale" and len(found) == 1:
                 found *= 3
         else:
+            if element.tag in ("vector", "point") and set(a) - {"name"} != {"x", "y", "z"}:
+                raise SceneError(f"<{element.tag}> needs a value, or all of x, y and z", element.place)
             found = [self.numbers(a[axis], element)[0] if axis in a else default for axis in "xyz"]
         if len(found) != 3:
             raise SceneError(f"<{element.tag}> needs three numbers, found {len(found)}", element.place)

@@ -20,7 +20,7 @@ SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 FULL_FRAME_DIAGONAL = math.hypot(36, 24)  # mm, of the 35 mm film that focal lengths refer to
 LARGEST_FILM = 65536
-FILTER_SETTINGS = {"gaussian": {"stddev": 0.5}, "mitchell": {"A": 1 / 3, "B": 1 / 3}, "lanczos": {"lobes": 3.0}, "tent": {"radius": 1.0}}
+FILTER_SETTINGS = {"gaussian": {"stddev": 0.5}, "mitchell": {"A": 1 / 3, "B": 1 / 3, "C": 1 / 3}, "lanczos": {"lobes": 3.0}, "tent": {"radius": 1.0}}
 
 
 @dataclass(frozen=True)

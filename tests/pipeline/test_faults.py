@@ -134,6 +134,18 @@ def test_job_that_cannot_fit_is_refused_with_the_figures(resume: bool, tmp_path:
     run_job(job, out=tmp_path / "run")
 
 
+def test_film_that_cannot_fit_into_memory_is_refused(tmp_path: pathlib.Path) -> None:
+    job = write_job(tmp_path, render={"resolution": [65535, 65535], "samples": 1})
+    with pytest.raises(JobError, match=r"65535 x 65535 pixels needs [\d.]+ TB of memory on 100 threads"):
+        run_job(job, out=tmp_path / "run", threads=100)
+    assert not (tmp_path / "run").exists()
+
+
+def test_job_of_more_walks_than_can_be_numbered(tmp_path: pathlib.Path) -> None:
+    with pytest.raises(JobError, match="more than a run can hold"):
+        validate_job(write_job(tmp_path, render={"samples": 1 << 31}))
+
+
 def test_free_space_counts_what_is_there(tmp_path: pathlib.Path, tiny_run: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that needs its last shard only must not be refused for the room that its own shards take."""
     monkeypatch.setattr("os.statvfs", lambda path: SimpleNamespace(f_bavail=1000, f_frsize=4096))

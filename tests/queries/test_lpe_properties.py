@@ -17,8 +17,7 @@ from queries.lpe.syntax import PathEvent
 FIXED = settings(max_examples=120, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 ATOMS = ["C", "L", "D", "S", "G", "s", ".", "R", "T", "V", "X", "'a'", "!'a'", "['a''b']", "[^'a']", "[DS]", "[^D]", "[^R]", "<RD>", "<TS'b'>",
-         "<R.!'a'>",
-         "<.x>", "<[RT][^D]>", "<..'a''b'>", "<R..>", r"'o\'b'"]  # fmt: skip
+         "<R.!'a'>", "<.x>", "<[RT][^D]>", "<..'a''b'>", "<R..>", r"'o\'b'"]  # fmt: skip
 REPETITIONS = ["*", "+", "?", "{2}", "{0}", "{1,}", "{,2}", "{1,3}"]
 parts = st.recursive(
     st.sampled_from(ATOMS),

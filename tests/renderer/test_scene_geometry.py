@@ -48,7 +48,10 @@ def test_shape_is_mitsubas(name: str) -> None:
     compare(load_scene(one_shape(SHAPES[name])), 400, 7, tangents=not name.startswith("ply"))
 
 
-@pytest.mark.parametrize("change", [{}, {"face_normals": True}, {"flip_tex_coords": False, "to_world": TURN}, {"to_world": MIRROR}, {"flip_normals": True}])
+OBJ_CHANGES = [{}, {"face_normals": True}, {"flip_tex_coords": False, "to_world": TURN}, {"to_world": MIRROR}, {"flip_normals": True}]
+
+
+@pytest.mark.parametrize("change", OBJ_CHANGES)
 @pytest.mark.parametrize("normals", [True, False])
 def test_obj_is_mitsubas(change: dict, normals: bool, session_folder: pathlib.Path) -> None:
     path = write_obj(session_folder, normals, f"blob_{normals}.obj")
@@ -83,13 +86,14 @@ def test_cornell_box_fits_the_published_corners() -> None:
             assert np.abs(found - corner).max(axis=1).min() <= tolerance, (name, corner)
 
 
-def test_box_is_closed_and_bounds_are_right() -> None:
+def test_bounds_and_areas_of_the_catalogue() -> None:
     scene = load_scene(ROOT / "configs" / "scenes" / "cornell.yaml")
+    g = scene.arrays.geometry
     for row, info in enumerate(scene.objects):
-        mine = scene.arrays.geometry.object == row
-        corners = np.concatenate([scene.arrays.geometry.p0[mine] + e[mine] for e in (0 * scene.arrays.geometry.e1, scene.arrays.geometry.e1, scene.arrays.geometry.e2)])
+        mine = g.object == row
+        corners = np.concatenate([g.p0[mine], g.p0[mine] + g.e1[mine], g.p0[mine] + g.e2[mine]])
         assert np.allclose([corners.min(axis=0), corners.max(axis=0)], info.bounds, atol=1e-3)
-        area = np.linalg.norm(np.cross(scene.arrays.geometry.e1[mine], scene.arrays.geometry.e2[mine]), axis=1).sum() / 2
+        area = np.linalg.norm(np.cross(g.e1[mine], g.e2[mine]), axis=1).sum() / 2
         assert area == pytest.approx(info.area, rel=1e-5)
 
 
@@ -97,7 +101,8 @@ def test_quadric_bounds_hold_their_points() -> None:
     rng = np.random.default_rng(5)
     angle, height = rng.uniform(0, 2 * np.pi, 2000), rng.uniform(0, 1, 2000)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(2000)], axis=1)
-    for name, local in (("disk_ellipse", ring), ("cylinder_ends", ring + height[:, None] * (0, 0, 1)), ("cylinder", ring + height[:, None] * (0, 0, 1))):
+    side = ring + height[:, None] * (0, 0, 1)
+    for name, local in (("disk_ellipse", ring), ("cylinder_ends", side), ("cylinder", side)):
         scene = load_scene(one_shape(SHAPES[name]))
         quadrics = scene.arrays.geometry.quadrics
         assert quadrics is not None
