@@ -8,6 +8,7 @@ from embreex.rtcore_scene import EmbreeScene
 from renderer.scene.arrays import Scene
 from renderer.shapes.flat import BLOCK, FLAT_LIMIT, ROWS, closest_flat, flat_triangles, occluded_flat
 from renderer.shapes.quadrics import intersect_quadrics, occluded_quadrics
+from renderer.shapes.surface import plane_distances
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -21,7 +22,7 @@ class Accelerators:
     """
 
     def __init__(self, scene: Scene, flat_limit: int = FLAT_LIMIT) -> None:
-        geometry = scene.arrays.geometry
+        self.geometry = geometry = scene.arrays.geometry
         self.triangles = len(geometry.p0)
         self.quadrics = geometry.quadrics
         self.flat: F32 | None = None
@@ -40,7 +41,9 @@ class Accelerators:
             primitive = np.empty(len(o), np.int32)
             closest_flat(self.flat, o, d, t, primitive, len(o), np.empty(ROWS * BLOCK, np.float32))
         else:
+            # embreex fills in distances only with four more arrays that nobody needs: compute them from the planes
             primitive = self.embree.run(o, d, dists=t, query="INTERSECT")
+            plane_distances(self.geometry.p0, self.geometry.ng, primitive, o, d, t, len(o))
         if self.quadrics is not None:
             intersect_quadrics(self.quadrics, self.triangles, o, d, t, primitive, len(o))
         return primitive

@@ -88,12 +88,11 @@ def equal_products(axes: "Axes") -> None:
 def label_curve(axes: "Axes", curve: ErrorCurve, color: str, above: bool) -> None:
     """The line's name at its end, and the samples of its first, middle and last point."""
     axes.annotate(curve.name, (curve.seconds[-1], curve.error[-1]), (9, 0), textcoords="offset points", color=color, va="center", fontweight="bold")
-    offset, align = ((5, 5), "left") if above else ((-5, -5), "right")
+    x, y = (5, 5) if above else (-5, -5)
+    place = {"ha": "left", "va": "bottom"} if above else {"ha": "right", "va": "top"}
     for i in sorted({0, len(curve.samples) // 2, len(curve.samples) - 1}):
-        text = f"{curve.samples[i]} spp"
-        axes.annotate(
-            text, (curve.seconds[i], curve.error[i]), offset, textcoords="offset points", fontsize=8, color=color, ha=align, va="bottom" if above else "top"
-        )
+        point = (curve.seconds[i], curve.error[i])
+        axes.annotate(f"{curve.samples[i]} spp", point, (x, y), textcoords="offset points", fontsize=8, color=color, **place)
 
 
 def plain_seconds(axes: "Axes") -> None:

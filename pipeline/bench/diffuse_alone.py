@@ -6,8 +6,8 @@ Only for processes with a kernel cache of their own: numba's cache cannot tell t
 import numpy as np
 
 from renderer.bsdfs.base import DIFFUSE, Bsdf, Families, Materials, Sample
-from renderer.bsdfs.dispatch import color, plain_bsdf
 from renderer.bsdfs.diffuse import eval_diffuse, sample_diffuse
+from renderer.bsdfs.dispatch import color, plain_bsdf
 from renderer.emitters.base import AREA, DirectionSample, Emitters
 from renderer.emitters.rectangle import pdf_area, sample_rectangle
 from renderer.integrators import path
@@ -39,9 +39,7 @@ def sample_only(families: Families, tables: None, m: Bsdf, wi: Vec3, u_lobe: np.
 
 
 @kernel
-def eval_only(
-    families: Families, tables: None, m: Bsdf, lobe: int, wi: Vec3, wo: Vec3, adjoint: bool
-) -> tuple[np.int32, Vec3, np.float32]:
+def eval_only(families: Families, tables: None, m: Bsdf, lobe: int, wi: Vec3, wo: Vec3, adjoint: bool) -> tuple[np.int32, Vec3, np.float32]:
     """Diffuse scattering's value and density."""
     return eval_diffuse(m, wi, wo)
 

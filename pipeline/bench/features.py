@@ -14,7 +14,11 @@ from pipeline.bench.worker import Worker, WorkerError
 from pipeline.progress import LOG
 
 BUILDS = ("specialized", "alone", "everything")
-LABELS = {"specialized": "specialized on the scene (the program)", "alone": "diffuse alone in the sources", "everything": "every feature in the kernels"}
+LABELS = {
+    "specialized": "specialized on the scene (the program)",
+    "alone": "diffuse alone in the sources",
+    "everything": "every feature in the kernels",
+}
 LEAST = 0.97
 TITLE, GOAL = "a diffuse scene, all features available, against a build with diffuse alone", "rate ≥ 0.97 ×"
 SAME = 1e-4  # relative difference of image means between builds: rounding, and nothing else
@@ -28,7 +32,13 @@ def measure_features(session: Session) -> SectionResult:
     if any(piece is not None for piece in others) or session.settings.method != "path":
         return SectionResult([Row(TITLE, GOAL, "not measured: the job is not a path-traced diffuse scene lit by rectangles")])
     samples, rounds = session.benchmark.features.samples, session.benchmark.features.rounds
-    arguments = [str(session.benchmark.threads), str(session.loaded.job), *session.loaded.overrides, f"render.samples={samples}", "render.sampler=independent"]
+    arguments = [
+        str(session.benchmark.threads),
+        str(session.loaded.job),
+        *session.loaded.overrides,
+        f"render.samples={samples}",
+        "render.sampler=independent",
+    ]
     with ExitStack() as stack:
         workers: dict[str, Worker] = {}
         for build in BUILDS:

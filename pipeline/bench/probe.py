@@ -41,4 +41,4 @@ def start(job: str, *overrides: str) -> dict[str, Any]:
 
 if __name__ == "__main__":
     _, what, *arguments = sys.argv
-    print(json.dumps({"peak": peak, "start": start}[what](*arguments)))
+    print(json.dumps(peak(*arguments) if what == "peak" else start(*arguments)))

@@ -23,7 +23,7 @@ class WorkerError(PipelineError):
 
 
 def environment(**changes: str | None) -> dict[str, str]:
-    """This process's environment for a Python child that finds our packages, with changes (None: removed)."""
+    """Our environment for a Python child that finds our packages, with changes (None: removed)."""
     known = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])), **changes}
     return {key: value for key, value in known.items() if value is not None}
 

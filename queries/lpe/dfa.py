@@ -97,7 +97,7 @@ def combine(a: Dfa, b: Dfa, accepts: Callable[[bool, bool], bool], work: Work) -
 
 
 def minimize(dfa: Dfa, work: Work) -> Dfa:
-    """The smallest DFA of the same language, by partition refinement that takes the smaller half (Hopcroft 1971)."""
+    """The smallest DFA of the same language, by partition refinement that takes the smaller half (hopcroft1971)."""
     symbols = dfa.transitions.shape[1]
     before: list[list[list[int]]] = [[[] for _ in range(dfa.states)] for _ in range(symbols)]
     for state, row in enumerate(dfa.transitions.tolist()):

@@ -1,7 +1,7 @@
 """Syntax tree to nondeterministic automaton: Glushkov's construction, one state for each symbol, no empty moves.
 
 Sets of positions are bits of Python integers. Position i is the i-th symbol of the expression with its repetitions written out.
-V. M. Glushkov, "The abstract theory of automata", Russian Mathematical Surveys 16(5), 1961.
+The construction is that of glushkov1961.
 """
 
 from collections.abc import Iterator

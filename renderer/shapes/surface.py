@@ -15,6 +15,21 @@ from renderer.shapes.quadrics import quadric_hit, quadric_parameters
 
 
 @kernel
+def plane_distances(
+    p0: npt.NDArray[np.float32], ng: npt.NDArray[np.float32], primitive: npt.NDArray[np.int32], o: npt.NDArray[np.float32],
+    d: npt.NDArray[np.float32], t: npt.NDArray[np.float32], n: int,
+) -> None:  # fmt: skip
+    """Write to ``t`` where each of n rays (n, 3) crosses the plane of the triangle it met, within its far end there.
+
+    Rays that met none (-1) keep their far ends."""
+    for i in range(n):
+        q = primitive[i]
+        if q >= 0:
+            normal = row(ng, q)
+            t[i] = min(max(dot(sub(row(p0, q), row(o, i)), normal) / dot(row(d, i), normal), ZERO), t[i])
+
+
+@kernel
 def clamp_barycentrics(b1: np.float32, b2: np.float32) -> tuple[np.float32, np.float32]:
     """The nearest weights of a point inside the triangle; NaN (a degenerate triangle) gives the first corner."""
     b1 = min(max(b1, ZERO), ONE) if b1 == b1 else ZERO

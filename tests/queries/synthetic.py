@@ -30,7 +30,7 @@ from renderer.tables import (
 )
 
 OBJECTS = [("floor", "white"), ("wall", "white"), ("glass_ball", "glass"), ("lamp", "black"), ("o'brien", "a\\b")]
-EMITTERS = [("lamp_light", 3, "L"), ("sky", None, "B"), ("glow", 1, "O"), ("spot", None, "L")]
+EMITTERS = [("lamp_light", 3, "L"), ("sky", None, "B"), ("glow", 1, "O"), ("spot", None, "L"), ("", None, "L")]  # the last has no name: no label
 SCATTERING = [event for event in EVENTS if event.key >= FIRST_SCATTERING]
 Letter = tuple[int, int]  # key of the event, object
 Tables = dict[str, list[dict[str, Any]]]  # rows by table
@@ -78,7 +78,8 @@ def event_of(letter: Letter) -> PathEvent:
 def emitter_of(number: int) -> PathEvent:
     """What an expression sees of an emitter."""
     name, thing, symbol = EMITTERS[number]
-    return PathEvent(symbol, None, (name, *(OBJECTS[thing] if thing is not None else ())))
+    labels = (name, *(OBJECTS[thing] if thing is not None else ()))
+    return PathEvent(symbol, None, tuple(label for label in labels if label))
 
 
 class WordTree:

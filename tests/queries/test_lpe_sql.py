@@ -36,6 +36,8 @@ EXPRESSIONS = [
     "C.*<O..[^'nobody']>",
     "C[^'floor']*<L..'spot'>",
     "C.*'sky'",
+    "C.*<L..[^'spot']>",
+    "C.*<L..!'spot'>",
 ]
 
 

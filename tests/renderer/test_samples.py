@@ -45,7 +45,8 @@ DIMENSIONS = (0, 1, 3, FIRST_BLOCK, FIRST_BLOCK + 3, SOBOL_DIMENSIONS - 1, SOBOL
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 def test_pairs_are_uniform(dimension: int) -> None:
     points = pairs(INDEPENDENT, np.arange(2**16), dimension)
-    assert points.min() >= 0 and points.max() < 1
+    assert points.min() >= 0
+    assert points.max() < 1
     assert np.array_equal(points * 2.0**24, np.floor(points * 2.0**24))
     assert grid_p_value(points) > sidak(len(DIMENSIONS))
 

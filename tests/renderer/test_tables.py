@@ -68,7 +68,8 @@ def test_image_from_paths_is_the_films(run: tuple[str, Tables, Film], scene: Sce
     image = np.zeros((s.height, s.width, 3))
     np.add.at(image, (paths["raster_y"].astype(int), paths["raster_x"].astype(int)), triples(paths, "contribution").astype(np.float64))
     expected = film.image(method, s.passes)
-    assert expected.min() >= 0 and expected.mean() > 0.05
+    assert expected.min() >= 0
+    assert expected.mean() > 0.05
     np.testing.assert_allclose(image / s.passes, expected, rtol=1e-5, atol=1e-7)
 
 
@@ -141,7 +142,8 @@ def test_words_spell_the_walks(run: tuple[str, Tables, Film], scene: Scene) -> N
             else:
                 assert letters[:-1] == seen[: depth - 1]
                 assert letters[-1] == (event, seen[depth - 1][1])
-                assert event >= FIRST_SCATTERING and event != SPECULAR_REFLECTION
+                assert event >= FIRST_SCATTERING
+                assert event != SPECULAR_REFLECTION
     assert techniques == ({EMITTER_HIT, EMITTER_SAMPLE} if method == "path" else {LENS_SAMPLE})
 
 
@@ -173,13 +175,19 @@ def test_values_are_sound(run: tuple[str, Tables, Film], scene: Scene) -> None:
     for name in ("paths", "occluded"):
         p = columns(tables[name])
         assert len(p["path"]) > 1000, name
-        assert (triples(p, "contribution") >= 0).all() and (triples(p, "contribution").max(axis=1) > 0).all()
+        assert (triples(p, "contribution") >= 0).all()
+        assert (triples(p, "contribution").max(axis=1) > 0).all()
         assert p["emitter"].max() < len(scene.emitters)
-        assert (p["raster_x"] >= 0).all() and (p["raster_x"] < s.width).all() and (p["raster_y"] >= 0).all() and (p["raster_y"] < s.height).all()
+        assert (p["raster_x"] >= 0).all()
+        assert (p["raster_x"] < s.width).all()
+        assert (p["raster_y"] >= 0).all()
+        assert (p["raster_y"] < s.height).all()
         if method == "path":
             pixel = p["camera_walk"].astype(np.int64) % s.walks_per_pass
-            assert np.array_equal(np.floor(p["raster_x"]), pixel % s.width) and np.array_equal(np.floor(p["raster_y"]), pixel // s.width)
-            assert (p["mis_weight"] > 0).all() and (p["mis_weight"] <= 1).all()
+            assert np.array_equal(np.floor(p["raster_x"]), pixel % s.width)
+            assert np.array_equal(np.floor(p["raster_y"]), pixel // s.width)
+            assert (p["mis_weight"] > 0).all()
+            assert (p["mis_weight"] <= 1).all()
         assert p[f"{side(method)}_depth"].max() <= s.max_depth - (p["technique"].max() != EMITTER_HIT and method == "light")
     v = vertices(method, tables)
     assert (triples(v, "throughput") >= 0).all()
@@ -194,7 +202,8 @@ def test_bytes(run: tuple[str, Tables, Film], scene: Scene) -> None:
     def width(schema: pa.Schema) -> int:
         return sum(f.type.bit_width for f in schema) // 8
 
-    assert width(v.schema) <= 32 and width(p.schema) <= 56
+    assert width(v.schema) <= 32
+    assert width(p.schema) <= 56
     assert set(tables) == {f"{side(method)}_vertices", "paths", "words"}
 
 
