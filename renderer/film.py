@@ -31,13 +31,21 @@ def add_filtered(sums: F64, raster: F32, value: F32, n: int, radius: np.float32,
     for i in range(n):
         x = raster[i, 0] - half
         y = raster[i, 1] - half
-        for py in range(max(0, np.int64(np.ceil(y - radius))), min(height - 1, np.int64(np.floor(y + radius))) + 1):
+        first_y, last_y = covered(y, radius, height)
+        first_x, last_x = covered(x, radius, width)
+        for py in range(first_y, last_y):
             wy = lookup(table, abs(np.float32(py) - y) * steps)
-            for px in range(max(0, np.int64(np.ceil(x - radius))), min(width - 1, np.int64(np.floor(x + radius))) + 1):
+            for px in range(first_x, last_x):
                 w = wy * lookup(table, abs(np.float32(px) - x) * steps)
                 for c in range(3):
                     sums[py, px, c] += np.float64(w) * np.float64(value[i, c])
                 sums[py, px, 3] += np.float64(w)
+
+
+@kernel
+def covered(center: np.float32, radius: np.float32, size: int) -> tuple[int, int]:
+    """The range of pixels within ``radius`` of ``center``, both counted from the first pixel's center."""
+    return int(max(0, np.ceil(center - radius))), int(min(size - 1, np.floor(center + radius))) + 1
 
 
 @kernel
@@ -47,7 +55,8 @@ def lookup(table: F32, x: np.float32) -> np.float32:
     if i >= table.shape[0] - 1:
         return ZERO
     f = x - np.float32(i)
-    return table[i] + f * (table[i + 1] - table[i])
+    value: np.float32 = table[i] + f * (table[i + 1] - table[i])
+    return value
 
 
 class Film:

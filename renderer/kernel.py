@@ -40,9 +40,10 @@ def cache_folder() -> pathlib.Path:
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    numba.config.CACHE_DIR = str(cache_folder())
+    numba.config.CACHE_DIR = str(cache_folder())  # type: ignore[attr-defined]
 
 
 def kernel(function: F) -> F:
     """Compile a function with the project's flags: no GIL, cached on disk, numpy's division, FMA contraction."""
-    return cast(F, numba.njit(nogil=True, cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False)(function))
+    compiler = cast(Any, numba.njit)  # its stubs know neither `_nrt` nor functions of arrays
+    return cast(F, compiler(nogil=True, cache=True, error_model="numpy", fastmath={"contract"}, _nrt=False)(function))

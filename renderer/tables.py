@@ -88,7 +88,14 @@ class Table:
         return pa.schema([pa.field(c.name, ARROW_TYPES[c.type], nullable=False) for c in self.columns if c.name in names])
 
 
-ARROW_TYPES = {"walk": pa.uint32(), "uint8": pa.uint8(), "uint16": pa.uint16(), "uint32": pa.uint32(), "uint64": pa.uint64(), "float32": pa.float32()}
+ARROW_TYPES = {
+    "walk": pa.uint32(),
+    "uint8": pa.uint8(),
+    "uint16": pa.uint16(),
+    "uint32": pa.uint32(),
+    "uint64": pa.uint64(),
+    "float32": pa.float32(),
+}
 """Arrow types by the names that ``Column.type`` uses; ``walk`` is widened to uint64 where a job has 2^32 walks or more."""
 
 _VERTEX_COLUMNS = (
@@ -134,7 +141,8 @@ _PATH_COLUMNS = (
 )
 
 PATHS = Table("paths", _PATH_COLUMNS)
-OCCLUDED = Table("occluded", (*_PATH_COLUMNS, Column("blocker", "uint16", "the first object that blocked the connection; 65535 where a grazing ray met none the second time")))
+_BLOCKER = Column("blocker", "uint16", "the first object that blocked the connection; 65535 where a grazing ray met none the second time")
+OCCLUDED = Table("occluded", (*_PATH_COLUMNS, _BLOCKER))
 WORDS = Table(
     "words",
     (

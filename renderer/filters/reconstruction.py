@@ -52,7 +52,8 @@ def _cubic(b: float, c: float) -> Callable[[F64], F64]:
         x = np.abs(x)
         near = (12 - 9 * b - 6 * c) * x**3 + (-18 + 12 * b + 6 * c) * x**2 + (6 - 2 * b)
         far = (-b - 6 * c) * x**3 + (6 * b + 30 * c) * x**2 + (-12 * b - 48 * c) * x + (8 * b + 24 * c)
-        return np.where(x < 1.0, near, np.where(x < 2.0, far, 0.0)) / 6.0
+        inside: F64 = np.where(x < 1.0, near, np.where(x < 2.0, far, 0.0)) / 6.0
+        return inside
 
     return weight
 

@@ -109,7 +109,7 @@ SEEN = 1 << 13  # slots of the word cache: 64 KiB, so that it stays near the cor
 
 def allocate(kind: type[NamedTuple], rows: int) -> Any:
     """A structure of ``rows`` rows of the named tuple ``kind``."""
-    columns = {}
+    columns: dict[str, npt.NDArray[Any]] = {}
     for name in kind._fields:
         dtype, width = _COLUMNS[name] if name != "emitter" else (np.int32 if kind is Lanes else np.uint16, 1)
         length = SEEN if name == "seen" else max(rows, 1)

@@ -7,9 +7,11 @@ from renderer.integrators.buffers import Lanes, PathRows
 from renderer.integrators.rows import copy_path
 from renderer.kernel import kernel
 
+I32 = npt.NDArray[np.int32]
+
 
 @kernel
-def connect(lanes: Lanes, paths: PathRows, first: int, last: int, blocked: npt.NDArray[np.int32]) -> int:
+def connect(lanes: Lanes, paths: PathRows, first: int, last: int, blocked: I32) -> int:
     """Keep the rows first … last whose connection is free (``blocked`` is -1), in order; the new number of rows.
 
     Every row that stays adds its contribution to its walk's radiance.
@@ -29,7 +31,7 @@ def connect(lanes: Lanes, paths: PathRows, first: int, last: int, blocked: npt.N
 
 
 @kernel
-def keep_blocked(paths: PathRows, first: int, last: int, blocked: npt.NDArray[np.int32], blocker: npt.NDArray[np.int32], out: PathRows, k: int) -> int:
+def keep_blocked(paths: PathRows, first: int, last: int, blocked: I32, blocker: I32, out: PathRows, k: int) -> int:
     """Copy the rows first … last whose connection is blocked to ``out`` from row k on; ``blocker`` is the first object met."""
     for i in range(first, last):
         ray = paths.ray[i]

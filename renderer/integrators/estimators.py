@@ -46,8 +46,8 @@ class LightTracer:
     def start(self, buffers: TileBuffers, n: int, recording: bool) -> Counters:
         """Rays of light that leave the emitters, each emitter's point connected to the lens."""
         return start_light_walks(  # type: ignore[no-any-return]
-            self.arrays, self.samples, buffers.lanes, buffers.rays, buffers.t, n, self.settings.max_depth, recording, buffers.shadow, buffers.vertices,
-            buffers.paths,
+            self.arrays, self.samples, buffers.lanes, buffers.rays, buffers.t, n, self.settings.max_depth, recording, buffers.shadow,
+            buffers.vertices, buffers.paths,
         )  # fmt: skip
 
     def interact(

@@ -12,7 +12,18 @@ import numpy.typing as npt
 from renderer.bsdfs.dispatch import eval_bsdf_lobe, load_bsdf, lobe_count, sample_bsdf
 from renderer.emitters.dispatch import emitted, pdf_direction, sample_direction, sky_pdf, sky_radiance
 from renderer.math.vec import to_local, to_world
-from renderer.samples import DIRECT_CHOICE, DIRECT_POINT, DIRECTION, FILM, LENS, LOBE_ROULETTE, block_dimension, primary_samples, sample_pair, walk_samples
+from renderer.samples import (
+    DIRECT_CHOICE,
+    DIRECT_POINT,
+    DIRECTION,
+    FILM,
+    LENS,
+    LOBE_ROULETTE,
+    block_dimension,
+    primary_samples,
+    sample_pair,
+    walk_samples,
+)
 from renderer.scene.arrays import Scene
 from renderer.sensors.dispatch import clip_distance, sample_ray
 from renderer.settings import TraceSettings
@@ -144,6 +155,6 @@ class MinimalPathTracer:
         return int(primitive[0]), best[0]
 
 
-def power_heuristic(p: float, q: float) -> float:
+def power_heuristic(p: float | np.float32, q: float | np.float32) -> float:
     """The power heuristic's weight of density p against q (veach1997)."""
     return float(p) ** 2 / (float(p) ** 2 + float(q) ** 2)

@@ -64,7 +64,7 @@ def power_heuristic(p: np.float32, q: np.float32) -> np.float32:
 def finite(c: Vec3) -> bool:
     """Whether a color is a number, and not black."""
     m = c[0] + c[1] + c[2]
-    return m > ZERO and m < FAR
+    return bool(m > ZERO and m < FAR)
 
 
 @kernel

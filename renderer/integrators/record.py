@@ -18,7 +18,7 @@ I64 = npt.NDArray[np.int64]
 
 
 @kernel
-def walk_order(lane: npt.NDArray[np.int32], n: int, lanes: int, recorded: npt.NDArray[np.uint8], start: I64, position: I64) -> int:
+def walk_order(lane: npt.NDArray[np.int32], n: int, lanes: int, recorded: npt.NDArray[np.uint8], start: I64, position: I64) -> np.int64:
     """``position[i]``: the rank of row i in (lane, row) order among recorded lanes, -1 for others; ``start``: first rank of each lane."""
     for j in range(lanes + 1):
         start[j] = 0
@@ -33,7 +33,7 @@ def walk_order(lane: npt.NDArray[np.int32], n: int, lanes: int, recorded: npt.ND
             position[i] = start[lane[i]]
             start[lane[i]] += 1
     # each start has moved on to the next lane's: move them back
-    total = start[lanes]
+    total: np.int64 = start[lanes]
     for j in range(lanes, 0, -1):
         start[j] = start[j - 1]
     start[0] = 0

@@ -4,6 +4,7 @@ import numpy as np
 
 from renderer.integrators.buffers import SEEN, PathRows, Rays, ShadowRays, VertexRows, WordRows
 from renderer.kernel import kernel
+from renderer.math.hash import Index
 from renderer.math.vec import ZERO, Vec3
 from renderer.shapes.base import Hit
 
@@ -11,7 +12,7 @@ SEEN_MASK = np.uint64(SEEN - 1)
 
 
 @kernel
-def append_vertex(rows: VertexRows, k: int, lane: int, depth: int, event: int, object_id: int, p: Vec3, beta: Vec3) -> int:
+def append_vertex(rows: VertexRows, k: int, lane: int, depth: int, event: Index, object_id: Index, p: Vec3, beta: Vec3) -> int:
     """Write one vertex at row k; the new number of rows."""
     rows.lane[k] = lane
     rows.depth[k] = depth
@@ -45,9 +46,9 @@ def append_path(
     ray: int,
     technique: int,
     depth: int,
-    event: int,
+    event: Index,
     word: np.uint64,
-    emitter: int,
+    emitter: Index,
     endpoint: Vec3,
     contribution: Vec3,
     weight: np.float32,
@@ -90,7 +91,7 @@ def copy_path(source: PathRows, i: int, target: PathRows, k: int) -> None:
 
 
 @kernel
-def append_word(rows: WordRows, k: int, word: np.uint64, parent: np.uint64, event: int, object_id: int) -> int:
+def append_word(rows: WordRows, k: int, word: np.uint64, parent: np.uint64, event: Index, object_id: Index) -> int:
     """Write a word at row k unless it was met lately; the new number of rows."""
     slot = word & SEEN_MASK
     if rows.seen[slot] == word:

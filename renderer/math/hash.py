@@ -3,9 +3,14 @@
 All constants carry their width, since numba would turn a product of mixed widths into float64.
 """
 
+from typing import Any
+
 import numpy as np
 
 from renderer.kernel import kernel
+
+Index = int | np.signedinteger[Any]
+"""An integer as kernels pass it: Python's or numpy's."""
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -23,7 +28,7 @@ def mix64(x: np.uint64) -> np.uint64:
 
 
 @kernel
-def extend_word(word: np.uint64, event: int, object_id: int) -> np.uint64:
+def extend_word(word: np.uint64, event: Index, object_id: Index) -> np.uint64:
     """The rolling hash of a walk's prefix, longer by one event at one object."""
     symbol = (np.uint64(event) << S32) | np.uint64(object_id)
     return mix64((word + GOLDEN) ^ (symbol * MIX_1))

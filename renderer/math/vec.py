@@ -23,37 +23,37 @@ Vec3 = tuple[np.float32, np.float32, np.float32]
 
 @kernel
 def add(a: Vec3, b: Vec3) -> Vec3:
-    """a + b."""
+    """The sum a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @kernel
 def sub(a: Vec3, b: Vec3) -> Vec3:
-    """a - b."""
+    """The difference a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @kernel
 def mul(a: Vec3, b: Vec3) -> Vec3:
-    """a * b, component by component."""
+    """The product a * b, component by component."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
 @kernel
 def scale(a: Vec3, s: np.float32) -> Vec3:
-    """a * s for a scalar s."""
+    """The vector a times the scalar s."""
     return (a[0] * s, a[1] * s, a[2] * s)
 
 
 @kernel
 def neg(a: Vec3) -> Vec3:
-    """-a."""
+    """The opposite vector."""
     return (-a[0], -a[1], -a[2])
 
 
 @kernel
 def madd(a: Vec3, s: np.float32, b: Vec3) -> Vec3:
-    """a * s + b."""
+    """The sum a * s + b."""
     return (a[0] * s + b[0], a[1] * s + b[1], a[2] * s + b[2])
 
 
@@ -71,7 +71,7 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 @kernel
 def normalize(a: Vec3) -> Vec3:
-    """a / |a|; a zero vector gives NaN."""
+    """The unit vector a / |a|; a zero vector gives NaN."""
     return scale(a, ONE / np.sqrt(dot(a, a)))
 
 

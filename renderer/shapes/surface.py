@@ -21,7 +21,8 @@ def plane_distances(
 ) -> None:  # fmt: skip
     """Write to ``t`` where each of n rays (n, 3) crosses the plane of the triangle it met, within its far end there.
 
-    Rays that met none (-1) keep their far ends."""
+    Rays that met none (-1) keep their far ends.
+    """
     for i in range(n):
         q = primitive[i]
         if q >= 0:
