@@ -249,11 +249,9 @@ class Run:
         if not self.job.aovs:
             return
         from queries.images import aov_image
-        from queries.run import open_run
 
         def resolve(expression: str) -> images.F32:
-            with open_run(self.folder.path, threads=1) as run:  # one thread adds in stored order: the same bits each time
-                return aov_image(run, expression)
+            return aov_image(self.folder.path, expression, threads=1)  # one thread adds in stored order: the same bits each time
 
         wanted = {name: expression for name, expression in self.job.aovs.items() if not self._has_image(name, expression)}
         with ThreadPoolExecutor(self.threads) as pool, progress("AOVs", len(wanted), "images") as bar:

@@ -15,25 +15,47 @@ from renderer.filters import reconstruction_filter
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 _CHUNK = 500_000  # rows that are filtered at a time
+_MAPPED_ROWS = 2_000_000  # paths that are mapped at a time: some 200 MB of memory
 
 
-def image(run: Run | str | os.PathLike[str]) -> F32:
-    """The image of all recorded paths: float32 (height, width, 3), linear."""
-    return _resolve(run, None)
+def image(run: Run | str | os.PathLike[str], threads: int | None = None) -> F32:
+    """The image of all recorded paths: float32 (height, width, 3), linear; see ``aov_image``."""
+    return _resolve(run, None, threads)
 
 
-def aov_image(run: Run | str | os.PathLike[str], expression: Expression | str) -> F32:
+def aov_image(run: Run | str | os.PathLike[str], expression: Expression | str, threads: int | None = None) -> F32:
     """The image of the paths that a light path expression matches: float32 (height, width, 3), linear.
 
-    Images of expressions that partition the paths sum to ``image``. Raises ``ExpressionError`` for a bad expression.
+    Images of expressions that partition the paths sum to ``image``. A run given by its path is gone through some shards at a
+    time, so that memory does not grow with it; with one thread, sums have the same bits each time. Raises ``ExpressionError``
+    for a bad expression.
     """
-    return _resolve(run, compile(expression) if isinstance(expression, str) else expression)
+    return _resolve(run, compile(expression) if isinstance(expression, str) else expression, threads)
 
 
-def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None) -> F32:
-    if not isinstance(run, Run):
-        with open_run(run) as opened:
-            return _resolve(opened, expression)
+def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None, threads: int | None) -> F32:
+    if isinstance(run, Run):
+        return _resolve_part(run, expression).astype(np.float32)
+    with open_run(run, threads=threads) as whole:
+        groups = _shard_groups(whole)
+        if len(groups) == 1:
+            return _resolve_part(whole, expression).astype(np.float32)
+        total = np.zeros((whole.settings["height"], whole.settings["width"], 3))
+    for shards in groups:
+        with open_run(run, threads=threads, shards=shards) as part:
+            total += _resolve_part(part, expression)
+    return total.astype(np.float32)
+
+
+def _shard_groups(run: Run) -> list[range]:
+    """The run's shards in runs of some ``_MAPPED_ROWS`` paths."""
+    count: int = run.manifest["shards"]["count"]
+    step = max(1, count * _MAPPED_ROWS // max(1, run.manifest["rows"]["paths"]))
+    return [range(first, min(first + step, count)) for first in range(0, count, step)]
+
+
+def _resolve_part(run: Run, expression: Expression | None) -> F64:
+    """What the open shards add to the image: float64 (height, width, 3)."""
     if run.settings["keep"] <= 0 or "paths" not in run.tables:
         raise QueryError(f"`{run.path}` recorded no paths (record.keep is none), so no image can be made of them: record some, as in `keep: 0.1`")
     columns = "p.raster_x, p.raster_y, p.contribution_r, p.contribution_g, p.contribution_b"
@@ -42,8 +64,7 @@ def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None) -
         sums = _box_sums(run, rows) / run.settings["passes"]
     else:
         sums = _filtered_sums(run, rows) / _weights(run)
-    resolved: F32 = (sums / run.settings["keep"]).astype(np.float32)
-    return resolved
+    return np.asarray(sums / run.settings["keep"])
 
 
 def _box_sums(run: Run, rows: str) -> F64:

@@ -1,5 +1,6 @@
 """Scenes that several test files share."""
 
+import copy
 import pathlib
 
 import pytest
@@ -12,8 +13,10 @@ ROOT = pathlib.Path(__file__).parent.parent
 
 @pytest.fixture(scope="session")
 def cornell() -> Scene:
-    """The measured Cornell box that the project ships."""
-    return load_scene(ROOT / "configs" / "scenes" / "cornell.yaml")
+    """The measured Cornell box that the project ships, on a film of 24 x 24 pixels."""
+    description = copy.deepcopy(load_scene(ROOT / "configs" / "scenes" / "cornell.yaml").description)
+    description["sensor"]["film"] |= {"width": 24, "height": 24}
+    return load_scene(description)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 INK, FAINT = "#222222", "#d9d9d9"
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  # Okabe and Ito's: told apart by everybody
 DPI = 160
+NAME_HEIGHT = 0.045  # of a line of text, as a share of the axes
 
 
 @dataclass(frozen=True)
@@ -38,26 +39,24 @@ def error_chart(path: pathlib.Path, curves: Sequence[ErrorCurve], title: str) ->
     figure, axes = new_chart((8.4, 5.6), title)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    for i, curve in enumerate(curves):
-        axes.plot(curve.seconds, curve.error, "-o", color=COLORS[i % len(COLORS)], markersize=4.5, linewidth=1.8, zorder=3)
-    leave_room(axes, curves)
+    fit_limits(axes, curves)
     equal_products(axes)
     for i, curve in enumerate(curves):
-        label_curve(axes, curve, COLORS[i % len(COLORS)], above=i % 2 == 1)
+        draw_curve(axes, curve, COLORS[i % len(COLORS)])
+    name_curves(axes, curves)
     axes.set_xlabel("wall time (s)")
-    axes.set_ylabel("mean squared error (linear radiance²)")
+    axes.set_ylabel("mean squared error (radiance²)")
     plain_seconds(axes)
     save(figure, path)
 
 
 def new_chart(size: tuple[float, float], title: str) -> tuple[Any, "Axes"]:
     """A figure with one quiet pair of axes."""
-    import matplotlib
-
-    matplotlib.use("agg")
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
     axes = figure.subplots()
     axes.set_title(title, loc="left", fontsize=11, color=INK)
     for side in ("top", "right"):
@@ -65,40 +64,53 @@ def new_chart(size: tuple[float, float], title: str) -> tuple[Any, "Axes"]:
     return figure, axes
 
 
-def leave_room(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
-    """Limits with space at the right for the lines' names."""
+def fit_limits(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
+    """Limits around all points; a logarithm has no place for errors that are not positive."""
     seconds = [s for curve in curves for s in curve.seconds]
     errors = [e for curve in curves for e in curve.error if e > 0]
-    axes.set_xlim(min(seconds) / 1.5, max(seconds) * 4.5)
-    axes.set_ylim(min(errors) / 2, max(errors) * 2)
+    axes.set_xlim(min(seconds) / 1.4, max(seconds) * 1.4)
+    axes.set_ylim(min(errors, default=1e-6) / 2, max(errors, default=1.0) * 1.7)
 
 
 def equal_products(axes: "Axes") -> None:
-    """Faint lines along which error x time is constant, a factor of two apart: how an unbiased renderer of independent samples falls."""
+    """Faint lines of constant error x time, a factor of two apart: along one, an unbiased renderer with independent samples comes down."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     product = left * low
     while product < right * high:
         axes.plot([left, right], [product / left, product / right], color=FAINT, linewidth=0.7, zorder=1, scalex=False, scaley=False)
         product *= 2.0
-    axes.annotate(
-        "gray: equal error × time, a factor of 2 apart", (0.0, 0.0), (6, 6), "axes fraction", "offset points", fontsize=8, color="#7a7a7a",
-    )  # fmt: skip
+    text = "circles: samples per pixel\ngray: equal error × time, each line half of the next"
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 3.0}
+    axes.annotate(text, (0.0, 0.0), (8, 8), "axes fraction", "offset points", fontsize=8, color="#6a6a6a", bbox=box, zorder=2)
 
 
-def label_curve(axes: "Axes", curve: ErrorCurve, color: str, above: bool) -> None:
-    """The line's name at its end, and the samples of its first, middle and last point."""
-    axes.annotate(curve.name, (curve.seconds[-1], curve.error[-1]), (9, 0), textcoords="offset points", color=color, va="center", fontweight="bold")
-    x, y = (5, 5) if above else (-5, -5)
-    place = {"ha": "left", "va": "bottom"} if above else {"ha": "right", "va": "top"}
-    for i in sorted({0, len(curve.samples) // 2, len(curve.samples) - 1}):
-        point = (curve.seconds[i], curve.error[i])
-        axes.annotate(f"{curve.samples[i]} spp", point, (x, y), textcoords="offset points", fontsize=8, color=color, **place)
+def draw_curve(axes: "Axes", curve: ErrorCurve, color: str) -> None:
+    """A line; every point is a circle with its number of samples inside."""
+    axes.plot(curve.seconds, curve.error, "-", color=color, linewidth=1.8, zorder=3)
+    axes.plot(curve.seconds, curve.error, "o", color=color, markersize=13, markeredgecolor="white", zorder=4)
+    for x, y, samples in zip(curve.seconds, curve.error, curve.samples, strict=True):
+        axes.annotate(str(samples), (x, y), color="white", fontsize=6.5, ha="center", va="center_baseline", zorder=5, annotation_clip=True)
+
+
+def name_curves(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
+    """The lines' names right of the axes, at the height of their last points but never closer than a line of text."""
+    heights = [axes.transAxes.inverted().transform(axes.transData.transform((c.seconds[-1], c.error[-1])))[1] for c in curves]
+    least = 1.0
+    for i in sorted(range(len(curves)), key=lambda k: -heights[k]):
+        height = min(float(heights[i]), least)
+        least = height - NAME_HEIGHT
+        end, name = (curves[i].seconds[-1], curves[i].error[-1]), curves[i].name
+        arrow = {"arrowstyle": "-", "color": COLORS[i % len(COLORS)], "linewidth": 0.7, "shrinkA": 0, "shrinkB": 7}
+        axes.annotate(
+            name, end, (1.02, height), "data", "axes fraction", arrow, color=COLORS[i % len(COLORS)], va="center", fontweight="bold", fontsize=9
+        )  # fmt: skip
 
 
 def plain_seconds(axes: "Axes") -> None:
-    """Seconds as plain decimals."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    """Seconds as plain decimals, at 1, 2 and 5 of each decade."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
 
@@ -109,13 +121,13 @@ def rate_chart(path: pathlib.Path, bars: Sequence[RateBar], title: str) -> None:
     for i, bar in enumerate(bars):
         rate, low, high = bar.rate / 1e6, bar.low / 1e6, bar.high / 1e6
         axes.barh(i, rate, color=COLORS[0] if bar.name.startswith("ours") else COLORS[1], height=0.62)
-        axes.plot([low, high], [i, i], color=INK, linewidth=1.4)
+        axes.errorbar(rate, i, xerr=[[rate - low], [high - rate]], color=INK, linewidth=1.2, capsize=3)
         axes.annotate(f"{rate:.2f}", (max(high, rate), i), (6, 0), textcoords="offset points", va="center", color=INK)
     axes.set_yticks(range(len(bars)), [bar.name for bar in bars])
     axes.invert_yaxis()
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel("million samples per second of wall time (median; the line is the range)")
+    axes.set_xlabel("million samples per second of wall time (median and range)")
     axes.margins(x=0.1)
     save(figure, path)
 

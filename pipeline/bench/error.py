@@ -59,7 +59,7 @@ def measure_error(session: Session) -> SectionResult:
             contender.render(samples, session.settings.seed + ERROR_SEED - 1)
         LOG.info("%s is warm", LABELS[name])
     reference = converge(session)
-    curves = {name: curve for name, curve in draw_curves(session, there, reference).items()}
+    curves = draw_curves(session, there, reference)
     figures: dict[str, Any] = {name: asdict(curve) for name, curve in curves.items()}
     figures["reference"] = {
         "halves": reference.halves,

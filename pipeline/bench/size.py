@@ -45,7 +45,7 @@ def table_sizes(folder: RunFolder) -> dict[str, tuple[int, int]]:
 def row_bytes(path: pathlib.Path) -> float:
     """Bytes of one row in all columns of a table, as its first file has them."""
     with pa.memory_map(str(min(path.iterdir()))) as source:
-        return sum(field.type.bit_width for field in pa.ipc.open_file(source).schema) / 8
+        return float(sum(field.type.bit_width for field in pa.ipc.open_file(source).schema)) / 8
 
 
 def folder_bytes(path: pathlib.Path) -> int:

@@ -44,7 +44,8 @@ def _tent(x: F64) -> F64:
 
 def _gaussian(x: F64) -> F64:
     # standard deviation of half a pixel, lowered so that it ends at zero at four deviations
-    return np.maximum(0.0, np.exp(-2.0 * x * x) - np.exp(-2.0 * 2.0 * 2.0))
+    value: F64 = np.maximum(0.0, np.exp(-2.0 * x * x) - np.exp(-2.0 * 2.0 * 2.0))
+    return value
 
 
 def _cubic(b: float, c: float) -> Callable[[F64], F64]:

@@ -124,12 +124,11 @@ def test_a_kept_share_is_the_same_rows(whole: tuple[str, Tables], scene: Scene) 
     assert shares[0] < shares[1], "a smaller share is part of a larger one"
 
 
-@pytest.mark.parametrize("method", ["path", "light"])
-def test_more_samples_append(scene: Scene, method: str) -> None:
+@pytest.mark.parametrize("sampler", ["independent", "sobol"])
+def test_more_samples_append(cornell: Scene, sampler: str) -> None:
     """Ids are pass-major: the rows of the first passes do not depend on how many follow."""
-    for sampler in ("independent", "sobol"):
-        few, many = (record(scene, settings_of(scene, n, method, sampler=sampler), (0, 256 * 4)) for n in (4, 8))
-        assert all(few[name].equals(many[name]) for name in few)
+    few, many = (record(cornell, settings_of(cornell, n, sampler=sampler), (0, 24 * 24 * 4)) for n in (4, 8))
+    assert all(few[name].equals(many[name]) for name in few)
 
 
 @pytest.mark.parametrize("method", ["path", "light"])
