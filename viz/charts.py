@@ -35,7 +35,11 @@ class RateBar:
 
 
 def error_chart(path: pathlib.Path, curves: Sequence[ErrorCurve], title: str) -> None:
-    """Mean squared error over seconds, both logarithmic; lines of equal error x time lie behind. Writes a PNG."""
+    """Mean squared error over seconds, both logarithmic; lines of equal error x time lie behind. Writes a PNG.
+
+    Points whose error is not positive (a corrected error may drown in its own noise) have no place on the axis, and are left out.
+    """
+    curves = [kept for curve in curves if (kept := positive(curve)).error]
     figure, axes = new_chart((8.4, 5.6), title)
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -48,6 +52,13 @@ def error_chart(path: pathlib.Path, curves: Sequence[ErrorCurve], title: str) ->
     axes.set_ylabel("mean squared error (radiance²)")
     plain_seconds(axes)
     save(figure, path)
+
+
+def positive(curve: ErrorCurve) -> ErrorCurve:
+    """The curve's points with positive errors."""
+    kept = [i for i, error in enumerate(curve.error) if error > 0]
+    seconds, error, samples = ([values[i] for i in kept] for values in (curve.seconds, curve.error, curve.samples))
+    return ErrorCurve(curve.name, seconds, error, [int(n) for n in samples])
 
 
 def new_chart(size: tuple[float, float], title: str) -> tuple[Any, "Axes"]:
@@ -65,11 +76,11 @@ def new_chart(size: tuple[float, float], title: str) -> tuple[Any, "Axes"]:
 
 
 def fit_limits(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
-    """Limits around all points; a logarithm has no place for errors that are not positive."""
+    """Limits around all points."""
     seconds = [s for curve in curves for s in curve.seconds]
-    errors = [e for curve in curves for e in curve.error if e > 0]
-    axes.set_xlim(min(seconds) / 1.4, max(seconds) * 1.4)
-    axes.set_ylim(min(errors, default=1e-6) / 2, max(errors, default=1.0) * 1.7)
+    errors = [e for curve in curves for e in curve.error]
+    axes.set_xlim(min(seconds, default=1.0) / 1.4, max(seconds, default=1.0) * 1.4)
+    axes.set_ylim(min(errors, default=1.0) / 2, max(errors, default=1.0) * 1.7)
 
 
 def equal_products(axes: "Axes") -> None:
@@ -87,9 +98,9 @@ def equal_products(axes: "Axes") -> None:
 def draw_curve(axes: "Axes", curve: ErrorCurve, color: str) -> None:
     """A line; every point is a circle with its number of samples inside."""
     axes.plot(curve.seconds, curve.error, "-", color=color, linewidth=1.8, zorder=3)
-    axes.plot(curve.seconds, curve.error, "o", color=color, markersize=13, markeredgecolor="white", zorder=4)
+    axes.plot(curve.seconds, curve.error, "o", color=color, markersize=15, markeredgecolor="white", zorder=4)
     for x, y, samples in zip(curve.seconds, curve.error, curve.samples, strict=True):
-        axes.annotate(str(samples), (x, y), color="white", fontsize=6.5, ha="center", va="center_baseline", zorder=5, annotation_clip=True)
+        axes.annotate(str(samples), (x, y), color="white", fontsize=6, ha="center", va="center_baseline", zorder=5, annotation_clip=True)
 
 
 def name_curves(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
@@ -100,10 +111,10 @@ def name_curves(axes: "Axes", curves: Sequence[ErrorCurve]) -> None:
         height = min(float(heights[i]), least)
         least = height - NAME_HEIGHT
         end, name = (curves[i].seconds[-1], curves[i].error[-1]), curves[i].name
-        arrow = {"arrowstyle": "-", "color": COLORS[i % len(COLORS)], "linewidth": 0.7, "shrinkA": 0, "shrinkB": 7}
-        axes.annotate(
-            name, end, (1.02, height), "data", "axes fraction", arrow, color=COLORS[i % len(COLORS)], va="center", fontweight="bold", fontsize=9
-        )  # fmt: skip
+        color = COLORS[i % len(COLORS)]
+        arrow = {"arrowstyle": "-", "color": color, "linewidth": 0.7, "shrinkA": 0, "shrinkB": 7}
+        text = axes.annotate(name, end, (1.02, height), "data", "axes fraction", arrow, color=color, va="center", fontsize=9, zorder=2)
+        text.set_fontweight("bold")
 
 
 def plain_seconds(axes: "Axes") -> None:

@@ -34,7 +34,7 @@ class Lanes(NamedTuple):
     walk: U64
     radiance: F32  # (n, 3) the sum of the walk's contributions, for the film
     raster: F32  # (n, 2) where on the film
-    emitter: I32  # light walks: the emitter that they left
+    source: I32  # light walks: the emitter that they left
     recorded: U8  # 1: the walk's rows are kept
 
 
@@ -102,7 +102,7 @@ _COLUMNS: dict[str, tuple[type, int]] = {
     "recorded": (np.uint8, 1), "far": (np.float32, 1), "depth": (np.uint8, 1), "event": (np.uint8, 1), "object": (np.uint16, 1),
     "position": (np.float32, 3), "primitive": (np.int32, 1), "uv": (np.float32, 2), "ray": (np.int32, 1), "technique": (np.uint8, 1),
     "endpoint": (np.float32, 3), "contribution": (np.float32, 3), "weight": (np.float32, 1), "blocker": (np.int32, 1),
-    "parent": (np.uint64, 1), "seen": (np.uint64, 1),
+    "emitter": (np.uint16, 1), "source": (np.int32, 1), "parent": (np.uint64, 1), "seen": (np.uint64, 1),
 }  # fmt: skip
 SEEN = 1 << 13  # slots of the word cache: 64 KiB, so that it stays near the core
 
@@ -111,7 +111,7 @@ def allocate(kind: type[NamedTuple], rows: int) -> Any:
     """A structure of ``rows`` rows of the named tuple ``kind``."""
     columns: dict[str, npt.NDArray[Any]] = {}
     for name in kind._fields:
-        dtype, width = _COLUMNS[name] if name != "emitter" else (np.int32 if kind is Lanes else np.uint16, 1)
+        dtype, width = _COLUMNS[name]
         length = SEEN if name == "seen" else max(rows, 1)
         columns[name] = np.zeros(length if width == 1 else (length, width), dtype)
     return kind(**columns)  # type: ignore[call-overload]

@@ -79,7 +79,7 @@ def start_light_walks(
         u1, u2 = sample_pair(samples, numbers, EMISSION_POINT)
         u3, u4 = sample_pair(samples, numbers, EMISSION_DIRECTION)
         light = sample_emission(emitters, scene.geometry, scene.textures, u_choice, u1, u2, u3, u4)
-        lanes.emitter[i] = light.emitter
+        lanes.source[i] = light.emitter
         lanes.radiance[i, 0] = ZERO
         lanes.radiance[i, 1] = ZERO
         lanes.radiance[i, 2] = ZERO
@@ -189,7 +189,7 @@ def interact_light(
                             paths.raster[n_paths, 0] = lens.raster_x
                             paths.raster[n_paths, 1] = lens.raster_y
                             n_paths = append_path(
-                                paths, n_paths, lane, n_shadow, LENS_SAMPLE, depth, lobe_event, end, lanes.emitter[lane], lens.point, c, ONE
+                                paths, n_paths, lane, n_shadow, LENS_SAMPLE, depth, lobe_event, end, lanes.source[lane], lens.point, c, ONE
                             )
                     if n_paths > asked:
                         start = offset_point(hit.p, hit.ng, hit.offset, lens.d)

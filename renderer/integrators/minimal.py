@@ -2,10 +2,14 @@
 
 It draws the same primary samples and asks the same BSDFs, emitters and sensor as ``path``, but it shares none of the
 wavefront: rays are tested against every triangle, in float64, and nothing is batched, compacted or recorded.
+
+Run it with ``NUMBA_DISABLE_JIT=1``: then the functions that it shares with the kernels are plain Python too, and float32
+stays float32 (a compiled function hands Python its own floats).
 """
 
 from typing import Any
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -44,7 +48,9 @@ class MinimalPathTracer:
         self.samples = primary_samples(settings)
 
     def radiance(self, walk: int) -> F64:
-        """The radiance, float64 (3,), that one camera walk estimates."""
+        """The radiance, float64 (3,), that one camera walk estimates. Raises RuntimeError where kernels are compiled."""
+        if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+            raise RuntimeError("the minimal path tracer runs in plain Python: set NUMBA_DISABLE_JIT=1 before starting Python")
         scene, emitters, textures = self.scene, self.scene.emitters, self.scene.textures
         numbers = walk_samples(self.samples, np.uint64(walk))
         o, d, far = self.camera_ray(walk, numbers)

@@ -1,10 +1,12 @@
 """What the minimal path tracer finds, run as plain Python: a program, because the JIT is switched off for a whole process.
 
-``python minimal_walks.py FOLDER`` writes ``FOLDER/walks.npz``: for each case, the radiance of its walks.
+``python minimal_walks.py FOLDER`` reads the compiled scenes of ``FOLDER/cases.pickle`` (compiling one takes long without the JIT) and
+writes ``FOLDER/walks.npz``: for each case, the radiance of its walks.
 """
 
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -60,6 +62,7 @@ def case(name: str, folder: Folder) -> tuple[Scene, TraceSettings, np.ndarray]:
 
 def run(folder: Folder) -> dict[str, np.ndarray]:
     """The radiance (walks, 3) of each case, found by this program in a process without the JIT."""
+    (folder / "cases.pickle").write_bytes(pickle.dumps({name: case(name, folder) for name in CASES}))
     paths = [str(Folder(__file__).parent), str(Folder(__file__).parent.parent), *sys.path]
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(filter(None, paths))}
     subprocess.run([sys.executable, __file__, str(folder)], env=environment, check=True, timeout=300)
@@ -69,8 +72,7 @@ def run(folder: Folder) -> dict[str, np.ndarray]:
 def main(folder: Folder) -> None:
     np.seterr(all="ignore")  # hashes overflow on purpose, and kernels divide as numpy does
     found = {}
-    for name in CASES:
-        scene, settings, walks = case(name, folder)
+    for name, (scene, settings, walks) in pickle.loads((folder / "cases.pickle").read_bytes()).items():
         twin = MinimalPathTracer(scene, settings)
         found[name] = np.array([twin.radiance(int(walk)) for walk in walks])
     np.savez(folder / "walks.npz", **found)

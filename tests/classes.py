@@ -1,0 +1,50 @@
+"""The energy of each class of light paths, read off the recorded words: camera words as they stand, light words in reverse."""
+
+import numpy as np
+from rendering import F64, Tables, columns
+
+from renderer.scene.arrays import Scene
+from renderer.settings import TraceSettings
+from renderer.tables import CAMERA_ROOT, EVENTS, LIGHT_ROOT
+
+LETTERS = {event.key: f"{event.type}{event.scattering}" for event in EVENTS if event.scattering}
+Energies = dict[str, F64]  # class -> (replicates, 3)
+
+
+def spellings(tables: Tables, method: str) -> dict[int, tuple[str, ...]]:
+    """The events of each word, from the camera to the light."""
+    root = CAMERA_ROOT if method == "path" else LIGHT_ROOT
+    words = {row["word"]: row for row in tables["words"].to_pylist()}
+    known: dict[int, tuple[str, ...]] = {root: ()}
+
+    def spell(word: int) -> tuple[str, ...]:
+        if word not in known:
+            row = words[word]
+            known[word] = (*spell(row["parent"]), LETTERS[row["event"]])
+        return known[word]
+
+    return {word: spell(word) if method == "path" else spell(word)[::-1] for word in [root, *words]}
+
+
+def class_energies(tables: Tables, scene: Scene, settings: TraceSettings, replicates: int) -> tuple[Energies, dict[str, int]]:
+    """For each class (its events and its emitter, as "RD TS L:lamp"): mean pixel values (replicates, 3), and the number of rows.
+
+    Replicates are ranges of passes of equal length.
+    """
+    side = "camera" if settings.method == "path" else "light"
+    paths = columns(tables["paths"])
+    word, inverse = np.unique(paths[f"{side}_word"], return_inverse=True)
+    spelled = spellings(tables, settings.method)
+    prefix = np.array([" ".join(spelled[int(w)]) for w in word], object)
+    names = np.array([f"{prefix[i]} L:{scene.emitters[e].name}".strip() for i, e in zip(inverse, paths["emitter"])])
+    chunk = paths[f"{side}_walk"].astype(np.int64) // settings.walks_per_pass * replicates // settings.passes
+    value = np.stack([paths[f"contribution_{c}"] for c in "rgb"], axis=1).astype(np.float64)
+    value /= settings.passes / replicates * settings.walks_per_pass
+    energies: Energies = {}
+    counts: dict[str, int] = {}
+    classes, which = np.unique(names, return_inverse=True)
+    for k, name in enumerate(classes):
+        rows = which == k
+        energies[name] = np.stack([np.bincount(chunk[rows], value[rows, c], replicates) for c in range(3)], axis=1)
+        counts[name] = int(rows.sum())
+    return energies, counts
