@@ -15,13 +15,13 @@ import pyarrow as pa
 
 from renderer.accelerators import FAR, Accelerators
 from renderer.film import Film
-from renderer.integrators.base import Estimator
 from renderer.integrators.buffers import Counters, TileBuffers, grow
 from renderer.integrators.connect import connect, keep_blocked
 from renderer.integrators.estimators import estimator
 from renderer.integrators.record import Recorder, used_words
 from renderer.kernel import kernel
 from renderer.math.hash import GOLDEN, mix64
+from renderer.samples import primary_samples
 from renderer.scene.arrays import Scene
 from renderer.settings import TraceSettings
 from renderer.tables import NO_OBJECT, OCCLUDED, PATHS, WORDS
@@ -72,7 +72,8 @@ class Tracer:
         self.accelerators = accelerators or Accelerators(scene)
         self.buffers = TileBuffers(min(tile, max(1, settings.walks)))
         self.recorder = Recorder(settings)
-        self.estimator: Estimator = estimator(scene, settings)
+        self.estimator = estimator(settings.method)
+        self.samples = primary_samples(settings)
 
     def schemas(self) -> dict[str, pa.Schema]:
         """The stored schema of every table that is recorded."""
@@ -122,9 +123,12 @@ class Tracer:
 
     def _advance(self, n: int, recording: bool) -> tuple[Counters, int]:
         """All bounces of one tile: the numbers of rows, and of occluded rows."""
-        buffers = self.buffers
+        buffers, settings = self.buffers, self.settings
         buffers.reserve(Counters(0, 0, 0, 0, 0), n)
-        counters = self.estimator.start(buffers, n, recording)
+        counters = self.estimator.start(
+            self.scene.arrays, self.samples, buffers.lanes, buffers.rays, buffers.t, n, settings.max_depth, recording,
+            buffers.shadow, buffers.vertices, buffers.paths,
+        )  # fmt: skip
         counters, occluded = self._connect(counters, 0, 0, recording)
         depth = 1
         while counters.rays:
@@ -133,7 +137,11 @@ class Tracer:
             primitives = self.accelerators.closest(buffers.rays.o[:active], buffers.rays.d[:active], t)
             buffers.reserve(counters, active)
             asked = counters.paths
-            counters = self.estimator.interact(buffers, t, primitives, depth, recording, counters)
+            counters = self.estimator.interact(
+                self.scene.arrays, self.samples, buffers.lanes, buffers.rays, t, primitives, depth, settings.max_depth,
+                settings.rr_depth, recording, buffers.next_rays, buffers.shadow, buffers.vertices, buffers.paths, buffers.words,
+                counters,
+            )  # fmt: skip
             counters, occluded = self._connect(counters, asked, occluded, recording)
             buffers.swap_rays()
             buffers.t[: counters.rays] = FAR

@@ -1,4 +1,8 @@
-"""Mean squared error against time: who is nearer to the truth after the same wait."""
+"""Mean squared error against time: who is nearer to the truth after the same wait.
+
+A few pixels where the light's own edge crosses the film can make up nearly all of a mean squared error, so the mean of relative
+squared errors, (x - reference)² / (reference² + 0.01), is told beside it.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,6 +21,7 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 PIECE = 128  # samples of one render of the reference: bounds memory and disk
 REFERENCE_SEED, ERROR_SEED = 1_000_000, 2_000_000  # added to the job's seed, so that no render shares numbers with another
+DARK = 0.01  # added to the squared reference, so that black pixels do not decide
 GOAL = "mean squared error below Mitsuba llvm's"
 
 
@@ -25,13 +30,14 @@ class Reference:
     """The mean of two independent halves, and how far from the truth it still is: half the halves' distance, squared."""
 
     image: F64
-    squared_error: float
+    squared_error: F64  # of each pixel and channel
     halves: tuple[str, str]
     mean_difference: float  # of the halves' image means, relative
 
-    def error(self, image: F32) -> float:
-        """Mean squared error of a picture over pixels and channels, less the reference's own."""
-        return float(np.mean((image - self.image) ** 2)) - self.squared_error
+    def error(self, image: F32) -> tuple[float, float]:
+        """Mean squared and mean relative squared error of a picture over pixels and channels, less the reference's own."""
+        error = (image - self.image) ** 2 - self.squared_error
+        return float(error.mean()), float(np.mean(error / (self.image**2 + DARK)))
 
 
 @dataclass(frozen=True)
@@ -40,12 +46,13 @@ class Curve:
 
     samples: list[int]
     error: list[float]
+    relative: list[float]
     wall: list[float]
     cpu: list[float]
 
-    def at(self, seconds: float) -> float:
-        """The error after some seconds on the wall: a straight line in logarithms between neighbors, or on from the last two."""
-        x, y = np.log(self.wall), np.log(self.error)
+    def at(self, seconds: float, errors: Sequence[float]) -> float:
+        """One of this curve's lists of errors after some seconds on the wall: straight lines in logarithms, carried on past the ends."""
+        x, y = np.log(self.wall), np.log(errors)
         i = int(np.clip(np.searchsorted(x, np.log(seconds)), 1, len(x) - 1))
         slope = (y[i] - y[i - 1]) / (x[i] - x[i - 1])
         return float(np.exp(y[i] + slope * (np.log(seconds) - x[i])))
@@ -64,7 +71,7 @@ def measure_error(session: Session) -> SectionResult:
     figures["reference"] = {
         "halves": reference.halves,
         "samples": session.benchmark.error.reference_samples,
-        "squared_error": reference.squared_error,
+        "squared_error": float(reference.squared_error.mean()),
         "mean_difference": reference.mean_difference,
     }
     return SectionResult(error_rows(curves, missing, session.settings.passes), figures, [error_table(curves), about(reference, session)])
@@ -88,18 +95,18 @@ def converge(session: Session) -> Reference:
             assert total is not None
             halves.append(total / pieces)
     a, b = halves
-    return Reference((a + b) / 2, float(np.mean((a - b) ** 2)) / 4, (LABELS[names[0]], LABELS[names[1]]), float(a.mean() / b.mean() - 1))
+    return Reference((a + b) / 2, (a - b) ** 2 / 4, (LABELS[names[0]], LABELS[names[1]]), float(a.mean() / b.mean() - 1))
 
 
 def draw_curves(session: Session, contenders: Mapping[str, Contender], reference: Reference) -> dict[str, Curve]:
     """Errors and times at every sample count; contenders alternate within each."""
     settings = session.benchmark.error
-    curves = {name: Curve([], [], [], []) for name in contenders}
+    curves = {name: Curve([], [], [], [], []) for name in contenders}
     with progress("error", len(settings.samples) * settings.rounds, "rounds") as bar:
         for samples in settings.samples:
-            errors: dict[str, list[float]] = {name: [] for name in contenders}
+            errors: dict[str, list[tuple[float, float]]] = {name: [] for name in contenders}
 
-            def render(name: str, number: int, samples: int = samples, errors: dict[str, list[float]] = errors):  # type: ignore[no-untyped-def]
+            def render(name: str, number: int, samples: int = samples, errors: dict[str, list[tuple[float, float]]] = errors):  # type: ignore[no-untyped-def]
                 image, timing = contenders[name].picture(samples, session.settings.seed + ERROR_SEED + number)
                 errors[name].append(reference.error(image))
                 return timing
@@ -107,7 +114,9 @@ def draw_curves(session: Session, contenders: Mapping[str, Contender], reference
             timings = alternate({name: lambda number, name=name: render(name, number) for name in contenders}, settings.rounds)  # type: ignore[misc]
             for name, curve in curves.items():
                 curve.samples.append(samples)
-                curve.error.append(float(np.mean(errors[name])))
+                squared, relative = np.mean(errors[name], axis=0)
+                curve.error.append(float(squared))
+                curve.relative.append(float(relative))
                 curve.wall.append(spread([t.wall for t in timings[name]]).median)
                 curve.cpu.append(spread([t.cpu for t in timings[name]]).median)
             bar.advance(settings.rounds)
@@ -126,8 +135,10 @@ def error_rows(curves: Mapping[str, Curve], missing: Mapping[str, str], samples:
             rows.append(Row(what, GOAL, missing.get("mitsuba_llvm", "not measured")))
             continue
         i = min(range(len(theirs.samples)), key=lambda k: abs(theirs.samples[k] - samples))
-        found = curve.at(theirs.wall[i]) / theirs.error[i]
-        measured = f"{found:.2f} × Mitsuba llvm's after {theirs.wall[i]:.2f} s (its {theirs.samples[i]} samples)"
+        found = curve.at(theirs.wall[i], curve.error) / theirs.error[i]
+        relative = curve.at(theirs.wall[i], curve.relative) / theirs.relative[i]
+        after = f"after {theirs.wall[i]:.2f} s (its {theirs.samples[i]} samples)"
+        measured = f"{found:.2f} × Mitsuba llvm's {after}; relative squared error {relative:.2f} ×"
         rows.append(Row(what, f"{GOAL} at equal wall time", measured, found < 1.0))
     return rows
 
@@ -136,18 +147,32 @@ def error_table(curves: Mapping[str, Curve]) -> str:
     """All errors and times."""
     rows: list[list[str]] = []
     for name, curve in curves.items():
-        for samples, error, wall, cpu in zip(curve.samples, curve.error, curve.wall, curve.cpu, strict=True):
-            rows.append([LABELS[name], str(samples), f"{error:.3e}", f"{wall:.3f}", f"{cpu:.3f}", f"{error * wall:.3e}", f"{error * cpu:.3e}"])
-    header = ["contender", "samples", "mean squared error", "wall s", "CPU s", "error × wall s", "error × CPU s"]
+        for samples, error, relative, wall, cpu in zip(curve.samples, curve.error, curve.relative, curve.wall, curve.cpu, strict=True):
+            rows.append(
+                [
+                    LABELS[name],
+                    str(samples),
+                    f"{error:.3e}",
+                    f"{relative:.3e}",
+                    f"{wall:.3f}",
+                    f"{cpu:.3f}",
+                    f"{error * wall:.3e}",
+                    f"{error * cpu:.3e}",
+                ]
+            )
+    header = ["contender", "samples", "mean squared error", "relative", "wall s", "CPU s", "error × wall s", "error × CPU s"]
     return markdown_table(header, rows)
 
 
 def about(reference: Reference, session: Session) -> str:
     """How the reference was made."""
+    samples, (ours, theirs) = session.benchmark.error.reference_samples, reference.halves
     return (
-        f"Reference: the mean of {session.benchmark.error.reference_samples} samples by {reference.halves[0]} and as many by {reference.halves[1]}, "
-        f"with other seeds; its own squared error, {reference.squared_error:.1e}, a quarter of the halves' mean squared difference, is taken off "
-        f"every figure. The halves' image means differ by {reference.mean_difference:+.1e}, relative."
+        f"Reference: the mean of {samples} samples by {ours} and as many by {theirs}, with other seeds; its own squared error, "
+        f"{reference.squared_error.mean():.1e}, a quarter of the halves' mean squared difference, is taken off every figure. "
+        f"The halves' image means differ by {reference.mean_difference:+.1e}, relative. "
+        "Relative squared error: (x - reference)² / (reference² + 0.01). A mean squared error can lie almost wholly in the few pixels "
+        "on the edge of a light, where sampling the film well is all that counts; the relative one weighs pixels more evenly."
     )
 
 

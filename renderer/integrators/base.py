@@ -1,20 +1,23 @@
-"""The contract of an estimator: how its walks start, and what one bounce does."""
+"""The contract of an estimator: two kernels, how its walks start and what one bounce does.
 
-from typing import Protocol
+``start(scene, samples, lanes, rays, t, n, max_depth, recording, shadow, vertices, paths) -> Counters`` gives the first n
+lanes their first ray, in ``t`` how far it reaches, and connects the walks' first vertex where that is sampled.
 
-import numpy as np
-import numpy.typing as npt
+``interact(scene, samples, lanes, rays, t, primitives, depth, max_depth, rr_depth, recording, out, shadow, vertices, paths,
+words, counters) -> Counters`` advances all rays by the bounce at ``depth``, given what they met: primitive ids (-1: nothing)
+and distances ``t``. Walks that go on are written to ``out``, connections to test to ``shadow``, and what is recorded to the
+other buffers (``integrators.buffers``), which have room.
+"""
 
-from renderer.integrators.buffers import Counters, TileBuffers
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from renderer.integrators.buffers import Counters
 
 
-class Estimator(Protocol):
-    """Both steps fill the tile's buffers and return the new numbers of rows."""
+@dataclass(frozen=True)
+class Estimator:
+    """The two kernels of an estimator; both return the new numbers of rows."""
 
-    def start(self, buffers: TileBuffers, n: int, recording: bool) -> Counters:
-        """Start the first n lanes' walks: rays to follow, and connections of the walks' first vertex where it is sampled."""
-
-    def interact(
-        self, buffers: TileBuffers, t: npt.NDArray[np.float32], primitives: npt.NDArray[np.int32], depth: int, recording: bool, counters: Counters
-    ) -> Counters:
-        """Advance all rays by the bounce at ``depth``, given what they met: primitive ids (-1: nothing) and distances."""
+    start: Callable[..., Counters]
+    interact: Callable[..., Counters]

@@ -66,7 +66,7 @@ def start_light_walks(
     vertices: VertexRows,
     paths: PathRows,
 ) -> Counters:
-    """Let light leave an emitter in each of the first n lanes, and connect the point that it leaves with the lens."""
+    """Let light leave an emitter in each of the first n lanes, and connect the point that it leaves with the lens (``integrators.base``)."""
     emitters, sensor = scene.emitters, scene.sensor
     share = ONE / np.float32(samples.walks_per_pass)
     n_rays = 0
@@ -126,7 +126,7 @@ def interact_light(
     words: WordRows,
     counters: Counters,
 ) -> Counters:
-    """One bounce of all light walks at ``depth``; the arguments are those of ``path.interact``."""
+    """One bounce of all light walks at ``depth`` (``integrators.base``)."""
     geometry, objects = scene.geometry, scene.objects
     share = ONE / np.float32(samples.walks_per_pass)
     n_out = 0

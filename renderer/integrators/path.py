@@ -29,7 +29,6 @@ from renderer.samples import (
     walk_samples,
 )
 from renderer.scene.arrays import SceneArrays
-from renderer.sensors.base import Sensor
 from renderer.sensors.dispatch import clip_distance, sample_ray
 from renderer.shapes.surface import offset_point, surface
 from renderer.tables import (
@@ -76,8 +75,21 @@ def lens_numbers(lens_radius: np.float32 | None, samples: PrimarySamples, number
 
 
 @kernel
-def start_camera_walks(sensor: Sensor, samples: PrimarySamples, lanes: Lanes, rays: Rays, t: npt.NDArray[np.float32], n: int) -> None:
-    """Give each of the first n lanes its film position, strictly inside its pixel, its ray, and in ``t`` how far that reaches."""
+def start_camera_walks(
+    scene: SceneArrays,
+    samples: PrimarySamples,
+    lanes: Lanes,
+    rays: Rays,
+    t: npt.NDArray[np.float32],
+    n: int,
+    max_depth: int,
+    recording: bool,
+    shadow: ShadowRays,
+    vertices: VertexRows,
+    paths: PathRows,
+) -> Counters:
+    """Give each of the first n lanes its film position, strictly inside its pixel, and its ray (``integrators.base``)."""
+    sensor = scene.sensor
     for i in range(n):
         walk = lanes.walk[i]
         numbers = walk_samples(samples, walk)
@@ -103,6 +115,7 @@ def start_camera_walks(sensor: Sensor, samples: PrimarySamples, lanes: Lanes, ra
         lanes.radiance[i, 1] = ZERO
         lanes.radiance[i, 2] = ZERO
         append_ray(rays, i, i, o, d, (ONE, ONE, ONE), ZERO, ONE, ROOT)
+    return Counters(n, 0, 0, 0, 0)
 
 
 @kernel
@@ -124,11 +137,7 @@ def interact(
     words: WordRows,
     counters: Counters,
 ) -> Counters:
-    """One bounce of all walks at ``depth``; the new numbers of rows.
-
-    ``rays`` (counters.rays of them) met ``primitives`` (-1: nothing) at distance ``t``. Walks that go on are written to
-    ``out``, connections to test to ``shadow``, and rows to the other buffers, which must have room (TileBuffers.reserve).
-    """
+    """One bounce of all walks at ``depth`` (``integrators.base``)."""
     geometry, objects, emitters, textures = scene.geometry, scene.objects, scene.emitters, scene.textures
     n_out = 0
     n_shadow = 0

@@ -111,19 +111,21 @@ def test_rates_are_judged_by_time_of_theirs_over_ours() -> None:
 
 def test_a_power_law_is_interpolated_exactly() -> None:
     seconds = [0.1, 0.2, 0.4, 0.8]
-    curve = Curve([1, 2, 4, 8], [0.03 * s**-1.3 for s in seconds], seconds, seconds)
+    errors = [0.03 * s**-1.3 for s in seconds]
+    curve = Curve([1, 2, 4, 8], errors, errors, seconds, seconds)
     for s in (0.05, 0.1, 0.33, 0.8, 3.0):
-        assert curve.at(s) == pytest.approx(0.03 * s**-1.3, rel=1e-9)
+        assert curve.at(s, curve.error) == pytest.approx(0.03 * s**-1.3, rel=1e-9)
 
 
 def test_error_is_compared_at_the_time_of_the_other() -> None:
     """Ours has a third of the error at equal samples, and takes twice as long for them."""
     n = [16, 64, 256]
-    theirs = Curve(n, [1 / k for k in n], [k / 100 for k in n], [k / 100 for k in n])
-    ours = Curve(n, [1 / (3 * k) for k in n], [k / 50 for k in n], [k / 50 for k in n])
+    theirs = Curve(n, [1 / k for k in n], [1 / k for k in n], [k / 100 for k in n], [k / 100 for k in n])
+    ours = Curve(n, [1 / (3 * k) for k in n], [1 / k for k in n], [k / 50 for k in n], [k / 50 for k in n])
     (row,) = error_rows({"sobol": ours, "mitsuba_llvm": theirs}, {}, 64)
     assert row.passed is True
     assert row.measured.startswith("0.67 × ")
+    assert row.measured.endswith("relative squared error 2.00 ×")
 
 
 def test_the_references_own_error_is_taken_off() -> None:
@@ -131,11 +133,13 @@ def test_the_references_own_error_is_taken_off() -> None:
     rng = np.random.default_rng(1)
     shape, noise, reference_noise = (200, 200, 3), 0.1, 0.08
     a, b = (rng.normal(1.0, reference_noise, shape) for _ in range(2))
-    reference = Reference((a + b) / 2, float(np.mean((a - b) ** 2)) / 4, ("a", "b"), 0.0)
-    found = reference.error(rng.normal(1.0, noise, shape).astype(np.float32))
+    reference = Reference((a + b) / 2, (a - b) ** 2 / 4, ("a", "b"), 0.0)
+    image = rng.normal(1.0, noise, shape).astype(np.float32)
+    found, relative = reference.error(image)
     spread_of_squares = np.sqrt(2.0 / np.prod(shape)) * (noise**2 + reference_noise**2 / 2)
     assert abs(found - noise**2) < 4.0 * np.sqrt(2.0) * spread_of_squares
-    assert reference.error(rng.normal(1.0, noise, shape).astype(np.float32)) + reference.squared_error > noise**2 + 0.8 * reference_noise**2 / 2
+    assert found + reference.squared_error.mean() == pytest.approx(np.mean((image - reference.image) ** 2), rel=1e-6)
+    assert relative == pytest.approx(found / 1.01, rel=0.05)  # the picture is 1 everywhere
 
 
 # --- LLVM and helper processes ------------------------------------------------------------------------------------
