@@ -22,7 +22,7 @@ EMITTER_CHOICE, EMISSION_POINT, EMISSION_DIRECTION, LENS_OF_EMITTER = 0, 1, 2, 3
 FIRST_BLOCK, BLOCK = 4, 4
 DIRECT_POINT, DIRECT_CHOICE, DIRECTION, LOBE_ROULETTE = 0, 1, 2, 3  # within a block; DIRECT_POINT is the lens for light walks
 
-SOBOL_DIMENSIONS = 12  # the walk's start and the first two depths; later dimensions are hashed
+SOBOL_DIMENSIONS = 8  # the walk's start and its first depth, where stratification pays; later dimensions are hashed
 
 S8, S40 = np.uint64(8), np.uint64(40)
 MASK_24 = np.uint64(0xFFFFFF)

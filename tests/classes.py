@@ -35,16 +35,18 @@ def class_energies(tables: Tables, scene: Scene, settings: TraceSettings, replic
     paths = columns(tables["paths"])
     word, inverse = np.unique(paths[f"{side}_word"], return_inverse=True)
     spelled = spellings(tables, settings.method)
-    prefix = np.array([" ".join(spelled[int(w)]) for w in word], object)
-    names = np.array([f"{prefix[i]} L:{scene.emitters[e].name}".strip() for i, e in zip(inverse, paths["emitter"])])
+    key = inverse * len(scene.emitters) + paths["emitter"]
+    of_key = np.array([" ".join((*spelled[int(w)], f"L:{emitter.name}")) for w in word for emitter in scene.emitters])
+    classes, class_of_key = np.unique(of_key, return_inverse=True)
+    which = class_of_key[key]
     chunk = paths[f"{side}_walk"].astype(np.int64) // settings.walks_per_pass * replicates // settings.passes
     value = np.stack([paths[f"contribution_{c}"] for c in "rgb"], axis=1).astype(np.float64)
     value /= settings.passes / replicates * settings.walks_per_pass
     energies: Energies = {}
     counts: dict[str, int] = {}
-    classes, which = np.unique(names, return_inverse=True)
-    for k, name in enumerate(classes):
-        rows = which == k
-        energies[name] = np.stack([np.bincount(chunk[rows], value[rows, c], replicates) for c in range(3)], axis=1)
-        counts[name] = int(rows.sum())
+    total = np.bincount(which, minlength=len(classes))
+    sums = [np.bincount(which * replicates + chunk, value[:, c], len(classes) * replicates).reshape(-1, replicates) for c in range(3)]
+    for k in np.flatnonzero(total):
+        energies[str(classes[k])] = np.stack([s[k] for s in sums], axis=1)
+        counts[str(classes[k])] = int(total[k])
     return energies, counts

@@ -2,6 +2,7 @@
 
 import concurrent.futures
 import dataclasses
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -51,12 +52,20 @@ def replicate_images(scene: Scene, settings: TraceSettings, replicates: int) -> 
     return np.stack([parts[i] for i in range(replicates)])
 
 
-def record(scene: Scene, settings: TraceSettings, walks: Any = None, film: Film | None = None, tile: int = TILE) -> Tables:
-    """The recorded tables of some walks (by default all), copied, by name."""
+def record(
+    scene: Scene, settings: TraceSettings, walks: Any = None, film: Film | None = None, tile: int = TILE, names: Collection[str] | None = None
+) -> Tables:
+    """The recorded tables of some walks (by default all), copied, by name; ``names``: only these tables."""
     tracer = Tracer(scene, settings, tile=tile)
-    sinks: dict[str, pa.BufferOutputStream] = {name: pa.BufferOutputStream() for name in tracer.schemas()}
-    writers = {name: pa.ipc.new_stream(sinks[name], schema) for name, schema in tracer.schemas().items()}
-    tracer.trace(walks if walks is not None else (0, settings.walks), lambda table, batch: writers[table].write_batch(batch), film)
+    schemas = {name: schema for name, schema in tracer.schemas().items() if names is None or name in names}
+    sinks: dict[str, pa.BufferOutputStream] = {name: pa.BufferOutputStream() for name in schemas}
+    writers = {name: pa.ipc.new_stream(sinks[name], schema) for name, schema in schemas.items()}
+
+    def write(table: str, batch: pa.RecordBatch) -> None:
+        if table in writers:
+            writers[table].write_batch(batch)
+
+    tracer.trace(walks if walks is not None else (0, settings.walks), write, film)
     for writer in writers.values():
         writer.close()
     return {name: pa.ipc.open_stream(sink.getvalue()).read_all() for name, sink in sinks.items()}

@@ -54,7 +54,7 @@ def one_sample(estimate: F64, expected: npt.ArrayLike) -> F64:
 def blocks(images: F64, size: int) -> F64:
     """Means over blocks of size x size pixels: (n, h, w, c) becomes (n, h / size, w / size, c)."""
     n, h, w, c = images.shape
-    assert h % size == 0 and w % size == 0, f"{w} x {h} pixels do not divide into blocks of {size}"
+    assert (h % size, w % size) == (0, 0), f"{w} x {h} pixels do not divide into blocks of {size}"
     return images.reshape(n, h // size, size, w // size, size, c).mean(axis=(2, 4))
 
 
@@ -73,7 +73,7 @@ def assert_same_image(a: F64, b: F64, folder: pathlib.Path, tests: int = 1, size
     the noise is so large that a relative bias of this size of the mean would pass. Images of both, and of p-values, are written to ``folder``.
     """
     assert a.shape[1:] == b.shape[1:], f"shapes differ: {a.shape} and {b.shape}"
-    assert np.isfinite(a).all() and np.isfinite(b).all(), "an image has values that are not finite"
+    assert np.isfinite(a.sum() + b.sum()), "an image has values that are not finite"
     a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
     p_blocks = welch(blocks(a, size), blocks(b, size))
     p_mean = welch(a.mean(axis=(1, 2)), b.mean(axis=(1, 2)))

@@ -91,10 +91,10 @@ def start_light_walks(
         if recording and lanes.recorded[i] != 0:
             n_vertices = append_vertex(vertices, n_vertices, i, 0, EMITTER, thing, light.point, light.radiance)
 
-        # the lens may see the emitter itself
+        # the lens may see the emitter itself, where that has a shape
         u, v = lens_numbers(sensor.lens_radius, samples, numbers, LENS_OF_EMITTER)
         lens = sample_lens(sensor, light.point, u, v)
-        if lens.visible:
+        if lens.visible and thing != NO_OBJECT:
             c = scale(emission_toward(emitters, scene.textures, light, lens.d), lens.importance * share)
             if finite(c):
                 paths.raster[n_paths, 0] = lens.raster_x

@@ -12,7 +12,8 @@ from stats import assert_same_image, blocks, sidak, welch
 from renderer.scene.load import load_scene
 
 REPLICATES = 16
-ENOUGH = 1000  # rows of a class in each render, for its mean to be nearly normal
+ENOUGH = 500  # rows of a class in each render, for its mean to be nearly normal
+NAMES = ("paths", "words")  # the tables that classes are read from
 LOBE_CLASSES = 48  # about how many classes the lobe tests compare in all
 DELTA = ("RS", "TS", "Ts")
 
@@ -30,7 +31,7 @@ def test_path_and_light_tracer_agree_class_by_class() -> None:
     found = {}
     for method, samples in (("path", 160), ("light", 240)):
         settings = settings_of(scene, samples * REPLICATES, method, rr_depth=100)
-        found[method] = class_energies(record(scene, settings), scene, settings, REPLICATES)
+        found[method] = class_energies(record(scene, settings, names=NAMES), scene, settings, REPLICATES)
     (path, path_rows), (light, light_rows) = found["path"], found["light"]
     names = [n for n in path if n in light and seen_by_both(n) and min(path_rows[n], light_rows[n]) >= ENOUGH]
 
@@ -54,10 +55,10 @@ def test_lobe_by_lobe(type: str, glossy: str, method: str) -> None:
     """The rows whose events are all of one lobe have the energy of a render in which the other lobe is black."""
     whole = with_all_features(load_scene(coated_scene(type)))
     settings = settings_of(whole, 96 * REPLICATES, method, rr_depth=100)
-    energies, rows = class_energies(record(whole, settings), whole, settings, REPLICATES)
+    energies, rows = class_energies(record(whole, settings, names=NAMES), whole, settings, REPLICATES)
     for lobe, other in (("RD", "specular_reflectance"), (glossy, "diffuse_reflectance")):
         alone = with_all_features(load_scene(coated_scene(type, **{other: 0.0})))
-        expected, expected_rows = class_energies(record(alone, settings), alone, settings, REPLICATES)
+        expected, expected_rows = class_energies(record(alone, settings, names=NAMES), alone, settings, REPLICATES)
         pure = [n for n, k in rows.items() if set(n.split(" ")[:-1]) == {lobe} and k >= ENOUGH]
         found = {"RD": 6, "RG": 4, "RS": 1 if method == "path" else 0}[lobe]  # of RS-only classes, a pinhole sees none by light walks
         assert len(pure) >= found, f"{lobe}: {pure}"
@@ -73,14 +74,15 @@ def test_direct_diffuse_light_is_noise_free_of_the_other_lobe(type: str, tmp_pat
     """Pixel blocks too: direct light by the diffuse lobe, taken from the rows, against a render of that lobe alone."""
     whole = with_all_features(load_scene(coated_scene(type)))
     settings = settings_of(whole, 32 * REPLICATES, max_depth=2)
-    tables = record(whole, settings)
+    tables = record(whole, settings, names=NAMES)
     spelled = spellings(tables, "path")
     paths = columns(tables["paths"])
     diffuse = np.array([spelled[int(w)] == ("RD",) for w in paths["camera_word"]])
     walk = paths["camera_walk"].astype(np.int64)[diffuse]
     images = np.zeros((REPLICATES, settings.walks_per_pass, 3))
     value = np.stack([paths[f"contribution_{c}"] for c in "rgb"], axis=1).astype(np.float64)[diffuse]
-    np.add.at(images, (walk // settings.walks_per_pass * REPLICATES // settings.passes, walk % settings.walks_per_pass), value * REPLICATES / settings.passes)
+    chunk, pixel = walk // settings.walks_per_pass * REPLICATES // settings.passes, walk % settings.walks_per_pass
+    np.add.at(images, (chunk, pixel), value * REPLICATES / settings.passes)
     alone = with_all_features(load_scene(coated_scene(type, specular_reflectance=0.0)))
     one, two = (replicate_images(alone, settings_of(alone, 32 * REPLICATES, max_depth=d), REPLICATES) for d in (1, 2))
     emitters = one.mean(axis=0)

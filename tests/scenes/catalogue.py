@@ -160,6 +160,7 @@ def environment_map(folder: Folder) -> Dict:
 def mesh_files(folder: Folder) -> Dict:
     """The four mesh formats, with smooth and flat normals, and a bitmap by texture coordinates."""
     image = {"type": "bitmap", "filename": gradient_png(folder), "filter_type": "bilinear", "to_uv": [scale(2, 2, 1)]}
+    coated = {"type": "plastic", "diffuse_reflectance": image}
     return scene(
         camera((0, 1.4, 4.2), (0, 0.5, 0), fov=45.0),
         5,
@@ -169,7 +170,7 @@ def mesh_files(folder: Folder) -> Dict:
         flat=shape(
             "obj", scale(0.3), move(-0.6, 0.35, 1), filename=write_obj(folder, False, "flat.obj"), face_normals=True, bsdf=diffuse(0.7, 0.3, 0.5)
         ),
-        ply=shape("ply", scale(0.45), turn("y", 60), move(-0.2, 0.5, 0), filename=write_ply(folder), bsdf={"type": "plastic", "diffuse_reflectance": image}),
+        ply=shape("ply", scale(0.45), turn("y", 60), move(-0.2, 0.5, 0), filename=write_ply(folder), bsdf=coated),
         stl=shape("mesh", scale(0.4), move(0.75, 0.5, 0), filename=write_mesh(folder, "stl"), bsdf=diffuse(0.3, 0.6, 0.5)),
         glb=shape("mesh", scale(0.4), move(0.5, 0.45, 1.1), filename=write_mesh(folder, "glb"), bsdf={"type": "diffuse", "reflectance": image}),
     )
@@ -190,7 +191,9 @@ def thin_lens(folder: Folder) -> Dict:
         fov=42.0,
         fov_axis="y",
     )
-    balls = {f"ball{i}": shape("sphere", scale(0.35), move(-0.9 + 0.6 * i, 0.4, 1.2 - 0.8 * i), bsdf=diffuse(0.3 + 0.2 * i, 0.5, 0.7)) for i in range(4)}
+    balls = {
+        f"ball{i}": shape("sphere", scale(0.35), move(-0.9 + 0.6 * i, 0.4, 1.2 - 0.8 * i), bsdf=diffuse(0.3 + 0.2 * i, 0.5, 0.7)) for i in range(4)
+    }
     return scene(sensor, 5, ground=floor(two_sided(diffuse(0.5, 0.5, 0.5))), lamp=lamp(5, 5, 5, 1.0, 3.0), **balls)
 
 
@@ -238,11 +241,12 @@ def textured_surfaces(folder: Folder) -> Dict:
 
 def colored_glass_in_a_furnace(folder: Folder) -> Dict:
     """A constant sky seen through smooth glass, thin glass and a hollow, unbounded."""
+    tinted = {"type": "dielectric", "int_ior": 1.6, "specular_transmittance": rgb(0.9, 0.7, 0.8)}
     return scene(
         camera((0, 0.3, 3.2), (0, 0, 0)),
         -1,
         sky={"type": "constant", "radiance": 0.8},
-        outer=shape("sphere", scale(0.6), move(-0.5, 0, 0), bsdf={"type": "dielectric", "int_ior": 1.6, "specular_transmittance": rgb(0.9, 0.7, 0.8)}),
+        outer=shape("sphere", scale(0.6), move(-0.5, 0, 0), bsdf=tinted),
         inner=shape("sphere", scale(0.45), move(-0.5, 0, 0), bsdf={"type": "dielectric", "int_ior": 1.0, "ext_ior": 1.6}),
         pane=shape("disk", scale(0.5), turn("y", 60), move(0.7, 0, 0), bsdf={"type": "thindielectric", "specular_reflectance": rgb(1, 0.8, 0.6)}),
         matte=shape("sphere", scale(0.25), move(0.3, -0.5, 0.5), bsdf=diffuse(0.8, 0.5, 0.3)),

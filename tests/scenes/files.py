@@ -59,7 +59,8 @@ def write_ply(folder: pathlib.Path) -> str:
     """The blob as ASCII PLY with normals and texture coordinates (u, v)."""
     mesh = blob()
     columns = np.hstack([mesh.vertices, mesh.vertex_normals, mesh.visual.uv])
-    header = ["ply", "format ascii 1.0", f"element vertex {len(columns)}", *(f"property float {n}" for n in ("x", "y", "z", "nx", "ny", "nz", "u", "v"))]
+    header = ["ply", "format ascii 1.0", f"element vertex {len(columns)}"]
+    header += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz", "u", "v")]
     header += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header"]
     rows = [" ".join(f"{x:.7f}" for x in row) for row in columns] + [f"3 {a} {b} {c}" for a, b, c in mesh.faces]
     (folder / "blob.ply").write_text("\n".join([*header, *rows]) + "\n")
