@@ -32,9 +32,7 @@ def pdf_area(distance: np.float32, cos_light: np.float32, density: np.float32) -
 
 
 @kernel
-def area_direction(
-    emitter: Index, p: Vec3, point: Vec3, normal: Vec3, offset: np.float32, radiance: Vec3, density: np.float32
-) -> DirectionSample:
+def area_direction(emitter: Index, p: Vec3, point: Vec3, normal: Vec3, offset: np.float32, radiance: Vec3, density: np.float32) -> DirectionSample:
     """The direction from ``p`` to a light point that was sampled with ``density`` per squared unit (choice of the emitter included)."""
     to_light = sub(point, p)
     squared_distance = dot(to_light, to_light)

@@ -135,9 +135,7 @@ class Recorder:
         names = ["path", "technique", f"{side}_depth", f"{side}_event", f"{side}_word", "emitter", "endpoint_x", "endpoint_y", "endpoint_z"]
         names += ["raster_x", "raster_y", "contribution_r", "contribution_g", "contribution_b", "mis_weight", "blocker"]
         columns = {name: self._column(OCCLUDED, name, total) for name in [f"{side}_walk", *names]}
-        fill_paths(
-            rows, n, lanes, self.camera, self._start, self._position, columns[f"{side}_walk"], tuple(columns[name] for name in names)
-        )
+        fill_paths(rows, n, lanes, self.camera, self._start, self._position, columns[f"{side}_walk"], tuple(columns[name] for name in names))
         return self._batch(table.name, columns, total)
 
     def words(self, rows: list[tuple[npt.NDArray[Any], ...]]) -> pa.RecordBatch:

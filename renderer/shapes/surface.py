@@ -67,9 +67,7 @@ def shading_normal(normals: npt.NDArray[np.float32] | None, primitive: Index, b1
 
 
 @kernel
-def texture_coordinates(
-    uvs: npt.NDArray[np.float32] | None, primitive: Index, b1: np.float32, b2: np.float32
-) -> tuple[np.float32, np.float32]:
+def texture_coordinates(uvs: npt.NDArray[np.float32] | None, primitive: Index, b1: np.float32, b2: np.float32) -> tuple[np.float32, np.float32]:
     """(u, v) at a triangle's barycentric weights; the weights themselves where the scene has no texture coordinates."""
     if uvs is None:
         return b1, b2
