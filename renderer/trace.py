@@ -149,7 +149,7 @@ class Tracer:
         return counters, occluded
 
     def _connect(self, counters: Counters, asked: int, occluded: int, recording: bool) -> tuple[Counters, int]:
-        """Test the connections of the path rows from ``asked`` on, and drop those that are blocked."""
+        """Test the connections of the path rows from ``asked`` on, and strike out those that are blocked."""
         buffers, m = self.buffers, counters.shadow
         o, d, far = buffers.shadow.o[:m], buffers.shadow.d[:m], buffers.shadow.far[:m]
         blocked = self.accelerators.occluded(o, d, far) if m else NO_RAYS
@@ -162,7 +162,9 @@ class Tracer:
                 blocker[which[met]] = self.scene.arrays.geometry.object[primitive[met]]
             buffers.occluded = grow(buffers.occluded, occluded, occluded + counters.paths - asked)
             occluded = keep_blocked(buffers.paths, asked, counters.paths, blocked, blocker, buffers.occluded, occluded)
-        paths = connect(buffers.lanes, buffers.paths, asked, counters.paths, blocked)
+        connect(buffers.lanes, buffers.paths, asked, counters.paths, blocked)
+        # a camera walk's sum is all that its paths leave behind where they are not recorded
+        paths = counters.paths if recording or self.settings.method == "light" else 0
         return Counters(counters.rays, 0, counters.vertices, paths, counters.words), occluded
 
     def _expose(self, film: Film, n: int, counters: Counters) -> None:

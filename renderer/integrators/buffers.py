@@ -60,7 +60,10 @@ class VertexRows(NamedTuple):
 
 
 class PathRows(NamedTuple):
-    """Full paths, in the order in which they were evaluated. ``ray`` is the connection to test, -1: none."""
+    """Full paths, in the order in which they were evaluated. ``ray`` is the connection to test, -1: none.
+
+    A row whose connection is blocked belongs to no walk: its ``lane`` is NO_LANE.
+    """
 
     lane: I32
     ray: I32
@@ -104,6 +107,7 @@ _COLUMNS: dict[str, tuple[type, int]] = {
     "endpoint": (np.float32, 3), "contribution": (np.float32, 3), "weight": (np.float32, 1), "blocker": (np.int32, 1),
     "emitter": (np.uint16, 1), "source": (np.int32, 1), "parent": (np.uint64, 1), "seen": (np.uint64, 1),
 }  # fmt: skip
+NO_LANE = -1
 SEEN = 1 << 13  # slots of the word cache: 64 KiB, so that it stays near the core
 
 

@@ -201,6 +201,7 @@ def interact(
 
             # ---- ask one emitter for light: one row for each lobe's share ----
             lobes = lobe_count(m)
+            asked_event, asked_word = np.int32(ABSORBED), word
             if lobes > 0:
                 u_choice = ZERO
                 if emitters.kind.shape[0] > 1:
@@ -222,6 +223,7 @@ def interact(
                             if kept:
                                 end = extend_word(word, lobe_event, thing)
                                 n_words = append_word(words, n_words, end, word, lobe_event, thing)
+                                asked_event, asked_word = lobe_event, end
                             n_paths = append_path(
                                 paths, n_paths, lane, n_shadow, EMITTER_SAMPLE, depth, lobe_event, end, light.emitter, light.endpoint, c, weight
                             )
@@ -254,8 +256,8 @@ def interact(
             # ---- go on ----
             if event >= DIFFUSE_REFLECTION:
                 wo = to_world(hit.s, hit.t, hit.n, (s.wo[0], s.wo[1], s.wo[2] * flip))
-                end = word
-                if kept:
+                end = asked_word
+                if kept and event != asked_event:
                     end = extend_word(word, event, thing)
                     n_words = append_word(words, n_words, end, word, event, thing)
                 n_out = append_ray(out, n_out, lane, offset_point(hit.p, hit.ng, hit.offset, wo), wo, throughput, s.pdf, eta, end)

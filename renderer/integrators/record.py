@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from renderer.integrators.buffers import Lanes, PathRows, VertexRows, WordRows
+from renderer.integrators.buffers import NO_LANE, Lanes, PathRows, VertexRows, WordRows
 from renderer.kernel import kernel
 from renderer.settings import TraceSettings
 from renderer.tables import ARROW_TYPES, CAMERA_VERTICES, LIGHT_VERTICES, OCCLUDED, PATHS, WORDS, Table
@@ -23,13 +23,13 @@ def walk_order(lane: npt.NDArray[np.int32], n: int, lanes: int, recorded: npt.ND
     for j in range(lanes + 1):
         start[j] = 0
     for i in range(n):
-        if recorded[lane[i]]:
+        if lane[i] != NO_LANE and recorded[lane[i]]:
             start[lane[i] + 1] += 1
     for j in range(lanes):
         start[j + 1] += start[j]
     for i in range(n):
         position[i] = -1
-        if recorded[lane[i]]:
+        if lane[i] != NO_LANE and recorded[lane[i]]:
             position[i] = start[lane[i]]
             start[lane[i]] += 1
     # each start has moved on to the next lane's: move them back
