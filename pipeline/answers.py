@@ -11,14 +11,14 @@ from pipeline.images import F32, write_exr, write_png
 from queries.images import aov_image, image
 from queries.lpe import compile
 from queries.run import Run, open_run
-from queries.sql import stream, write
+from queries.sql import TIME_LIMIT, stream, write
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 
 
-def print_rows(path: pathlib.Path, text: str, format: str) -> None:
-    """Run one SQL query and write its rows to stdout. Raises QueryError."""
-    with open_run(path) as run, stream(run, text) as reader:
+def print_rows(path: pathlib.Path, text: str, format: str, time_limit: float | None = None) -> None:
+    """Run one SQL query, for at most so many seconds, and write its rows to stdout. Raises QueryError."""
+    with open_run(path) as run, stream(run, text, time_limit or TIME_LIMIT) as reader:
         write(reader, format, sys.stdout.buffer)
         sys.stdout.buffer.flush()
 
@@ -28,8 +28,8 @@ def print_expression(path: pathlib.Path, text: str, out: pathlib.Path | None) ->
     expression = compile(text)
     if out is not None and out.suffix not in (".exr", ".png"):
         raise JobError(f"expected an image file that ends in .exr or .png, found `{out}`")
+    selected, whole = aov_image(path, expression), image(path)  # by path: some shards at a time
     with open_run(path) as run:
-        selected, whole = aov_image(run, expression), image(run)
         rows = run.connection.execute(f"SELECT count(*) FROM ({expression.sql(columns='p.path', light_words=run.light_words)})").fetchone()
         total = run.connection.execute("SELECT count(*) FROM paths").fetchone()
         if out is not None:

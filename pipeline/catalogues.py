@@ -119,7 +119,8 @@ def merged_words(folder: RunFolder, shards: tuple[Shard, ...]) -> pa.Table:
 def _distinct(rows: Any) -> Any:
     """Rows of ``_WORD`` sorted by word, each word once."""
     rows = rows[np.argsort(rows["word"], kind="stable")]
-    again = np.concatenate([[False], rows["word"][1:] == rows["word"][:-1]])
+    again = np.zeros(len(rows), bool)
+    again[1:] = rows["word"][1:] == rows["word"][:-1]
     for name in ("parent", "event", "object"):
         clash = np.flatnonzero(again[1:] & (rows[name][1:] != rows[name][:-1]))
         if len(clash):

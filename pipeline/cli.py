@@ -87,12 +87,15 @@ def sql(
     run: RunArgument,
     query: Annotated[str, typer.Argument(metavar="QUERY", help='SQL, such as "SELECT count(*) FROM paths".')],
     format: Annotated[Format, typer.Option("--format", help="How rows are printed.")] = Format.table,
+    time_limit: Annotated[
+        int | None, typer.Option("--time-limit", metavar="SECONDS", min=1, max=10**9, help="Stop the query after so long (default: 60).")
+    ] = None,
 ) -> None:
     """Ask a run a question in SQL (DuckDB, read-only)."""
     with _clear_exit():
         from pipeline.answers import print_rows
 
-        print_rows(run, query, format.value)
+        print_rows(run, query, format.value, time_limit)
 
 
 @app.command()

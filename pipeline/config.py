@@ -5,12 +5,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from renderer.scene.sensors import LARGEST_FILM
 from renderer.settings import UNBOUNDED_DEPTH
 
-MAX_PIXELS_ACROSS = 65535
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
-Pixels = Annotated[int, Field(ge=1, le=MAX_PIXELS_ACROSS)]
+Pixels = Annotated[int, Field(ge=1, le=LARGEST_FILM)]
 
 
 class Section(BaseModel):
@@ -38,9 +38,16 @@ class Render(Section):
         description="Longest path, in segments (Mitsuba's meaning: 1 is emitters alone, 2 adds direct light); -1 is unbounded, up to 255.",
     )
     rr_depth: int | None = Field(default=None, ge=1, le=2**16 - 1, description="Depth from which on Russian roulette may end a walk, in segments.")
-    seed: int = Field(default=0, ge=0, lt=2**63, description="Seed of all random numbers: the same job and seed give the same bits.")
-    sampler: Literal["independent", "sobol"] = Field(
-        default="sobol", description="`sobol` (Owen-scrambled points, less noise) or `independent` random numbers."
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        lt=2**63,
+        description="Seed of all random numbers: the same job and seed give the same bits. A scene whose sampler names none asks for 0.",
+    )
+    sampler: Literal["independent", "sobol"] | None = Field(
+        default=None,
+        description="`sobol` (Owen-scrambled points, less noise) or `independent` random numbers. "
+        "A scene whose sampler is not `independent` asks for `sobol`.",
     )
     replicates: int = Field(
         default=4, ge=1, le=1024, description="Independent scramblings that Sobol passes take in turn, so that standard errors can be computed."

@@ -8,6 +8,7 @@ import platform
 from dataclasses import asdict
 from typing import Any
 
+import llvmlite.binding
 import numpy as np
 
 from pipeline.config import Job
@@ -31,9 +32,9 @@ def trace_settings(job: Job, scene: Scene) -> TraceSettings:
         height=height,
         passes=render.samples or defaults.samples,
         max_depth=UNBOUNDED_DEPTH if depth < 0 else min(depth, UNBOUNDED_DEPTH),
-        rr_depth=render.rr_depth or defaults.rr_depth,
-        seed=render.seed,
-        sampler=render.sampler,
+        rr_depth=min(render.rr_depth or defaults.rr_depth, UNBOUNDED_DEPTH + 1),  # no walk is deeper, so never
+        seed=defaults.seed if render.seed is None else render.seed,
+        sampler=render.sampler or defaults.sampler,
         replicates=render.replicates,
         filter=render.filter or defaults.filter,
         keep=job.record.share,
@@ -86,6 +87,11 @@ def renderer_version() -> str:
     return cache_folder().name.removeprefix("kernels-")
 
 
+def processor() -> str:
+    """The processor that kernels are compiled for: another one may have other instructions, and so other last bits."""
+    return str(llvmlite.binding.get_host_cpu_name())
+
+
 def differences(old: dict[str, Any], new: dict[str, Any]) -> str:
     """In words, how two fingerprints differ; empty where they do not."""
     before, after = old.get("settings", {}), new["settings"]
@@ -98,7 +104,7 @@ def differences(old: dict[str, Any], new: dict[str, Any]) -> str:
 def versions() -> dict[str, str]:
     """Versions of everything that a pixel depends on."""
     found = {name: importlib.metadata.version(name) for name in _PACKAGES}
-    return {"python": platform.python_version(), "machine": platform.machine(), "renderer": renderer_version(), **found}
+    return {"python": platform.python_version(), "machine": platform.machine(), "processor": processor(), "renderer": renderer_version(), **found}
 
 
 def camera(scene: Scene) -> dict[str, Any]:

@@ -17,13 +17,16 @@ from pipeline.errors import JobError, RunFolderError
 from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large, refuse_too_much_memory
 from pipeline.executor import render_shards
 from pipeline.files import FileRecord, checksum, clear_errors
-from pipeline.identity import camera, differences, renderer_version, settings_as_json, versions
+from pipeline.identity import camera, differences, processor, renderer_version, settings_as_json, versions
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
 from pipeline.shards import Shard, plan_shards, shard_count, shard_size
 from renderer.film import Film
 from renderer.trace import Tracer
+
+_AOV_WORKERS = 8
+_AOV_MEMORY = 2000 // _AOV_WORKERS  # MB for each worker's queries, beyond which they spill to disk
 
 
 @dataclass
@@ -207,12 +210,18 @@ class Run:
         LOG.info("traced %d walks in %.1f s", walks, self.watch.seconds["render"] - seconds)
 
     def _check_version(self, going_on: bool) -> None:
-        """Shards of two versions of the renderer must not be mixed."""
+        """Shards of two versions of the renderer, or of two kinds of processor, must not be mixed."""
         here, there = renderer_version(), self.manifest["versions"].get("renderer")
         if going_on and here != there:
             raise RunFolderError(
                 f"`{self.folder.path}` was begun by another version of the renderer ({there}, this is {here}), whose numbers may differ "
                 "in their last bits: go on with that version, or choose another folder with --out"
+            )
+        here, there = processor(), self.manifest["versions"].get("processor")
+        if going_on and here != there:
+            raise RunFolderError(
+                f"`{self.folder.path}` was begun on another kind of processor ({there}, this is {here}), whose numbers may differ "
+                "in their last bits: go on with it there, or choose another folder with --out"
             )
         self.manifest["versions"] = versions()
 
@@ -251,10 +260,11 @@ class Run:
         from queries.images import aov_image
 
         def resolve(expression: str) -> images.F32:
-            return aov_image(self.folder.path, expression, threads=1)  # one thread adds in stored order: the same bits each time
+            # One thread, of a memory that does not depend on how many there are, adds in the same order each time: the same bits
+            return aov_image(self.folder.path, expression, threads=1, memory_limit=f"{_AOV_MEMORY}MB")
 
         wanted = {name: expression for name, expression in self.job.aovs.items() if not self._has_image(name, expression)}
-        with ThreadPoolExecutor(self.threads) as pool, progress("AOVs", len(wanted), "images") as bar:
+        with ThreadPoolExecutor(min(self.threads, _AOV_WORKERS)) as pool, progress("AOVs", len(wanted), "images") as bar:
             for (name, expression), pixels in zip(wanted.items(), pool.map(resolve, wanted.values()), strict=True):
                 self._write_image(name, pixels, expression)
                 bar.advance(1)

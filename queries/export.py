@@ -31,7 +31,7 @@ def export_parquet(run: Run, folder: str | os.PathLike[str]) -> dict[str, int]:
     except OSError as error:
         raise QueryError(f"cannot write Parquet files into `{target}`: {error}") from None
     finally:
-        connection.close()
+        run.disconnect(connection)
 
 
 def _export(connection: duckdb.DuckDBPyConnection, name: str, file: pathlib.Path) -> int:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from queries.errors import QueryError, RunError
 from queries.lpe import Expression, compile
-from queries.run import Run, open_run
+from queries.run import MEMORY_LIMIT, Run, open_run
 from queries.sql import batches
 from renderer.filters import reconstruction_filter
 
@@ -18,31 +18,31 @@ _CHUNK = 500_000  # rows that are filtered at a time
 _MAPPED_ROWS = 2_000_000  # paths that are mapped at a time: some 200 MB of memory
 
 
-def image(run: Run | str | os.PathLike[str], threads: int | None = None) -> F32:
+def image(run: Run | str | os.PathLike[str], threads: int | None = None, memory_limit: str = MEMORY_LIMIT) -> F32:
     """The image of all recorded paths: float32 (height, width, 3), linear; see ``aov_image``."""
-    return _resolve(run, None, threads)
+    return _resolve(run, None, threads, memory_limit)
 
 
-def aov_image(run: Run | str | os.PathLike[str], expression: Expression | str, threads: int | None = None) -> F32:
+def aov_image(run: Run | str | os.PathLike[str], expression: Expression | str, threads: int | None = None, memory_limit: str = MEMORY_LIMIT) -> F32:
     """The image of the paths that a light path expression matches: float32 (height, width, 3), linear.
 
     Images of expressions that partition the paths sum to ``image``. A run given by its path is gone through some shards at a
-    time, so that memory does not grow with it; with one thread, sums have the same bits each time. Raises ``ExpressionError``
-    for a bad expression.
+    time, so that memory does not grow with it, by so many threads within ``memory_limit``; with one thread, sums have the same
+    bits each time. Raises ``ExpressionError`` for a bad expression.
     """
-    return _resolve(run, compile(expression) if isinstance(expression, str) else expression, threads)
+    return _resolve(run, compile(expression) if isinstance(expression, str) else expression, threads, memory_limit)
 
 
-def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None, threads: int | None) -> F32:
+def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None, threads: int | None, memory_limit: str) -> F32:
     if isinstance(run, Run):
         return _resolve_part(run, expression).astype(np.float32)
-    with open_run(run, threads=threads) as whole:
+    with open_run(run, memory_limit, threads) as whole:
         groups = _shard_groups(whole)
         if len(groups) == 1:
             return _resolve_part(whole, expression).astype(np.float32)
         total = np.zeros((whole.settings["height"], whole.settings["width"], 3))
     for shards in groups:
-        with open_run(run, threads=threads, shards=shards) as part:
+        with open_run(run, memory_limit, threads, shards) as part:
             total += _resolve_part(part, expression)
     return total.astype(np.float32)
 

@@ -29,7 +29,7 @@ class Run:
     """An open run: a context manager.
 
     ``path`` the folder, ``manifest`` its manifest, ``tables`` the stored Arrow tables by name (memory-mapped),
-    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which none sees another's changes.
+    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which none sees another's changes; ``disconnect`` ends one.
     """
 
     def __init__(self, path: pathlib.Path, manifest: dict[str, Any], tables: dict[str, pa.Table], memory_limit: str, threads: int | None) -> None:
@@ -39,7 +39,7 @@ class Run:
         self.memory_limit = memory_limit
         self.threads = threads
         self._spill = pathlib.Path(tempfile.mkdtemp(prefix="pathspace-"))
-        self._connections: list[duckdb.DuckDBPyConnection] = []
+        self._connections: dict[duckdb.DuckDBPyConnection, pathlib.Path] = {}  # open ones, and where they spill
         self._own: duckdb.DuckDBPyConnection | None = None
 
     @property
@@ -62,22 +62,28 @@ class Run:
 
     def connect(self) -> duckdb.DuckDBPyConnection:
         """A fresh connection: the views, and what a query makes in it; files, settings and extensions are out of reach."""
-        spill = self._spill / str(len(self._connections))
-        spill.mkdir()
+        spill = pathlib.Path(tempfile.mkdtemp(dir=self._spill))
         config: dict[str, str | bool | int | float | list[str]] = {**_LOCKED, "memory_limit": self.memory_limit, "temp_directory": str(spill)}
         if self.threads:
             config["threads"] = str(self.threads)
         connection = duckdb.connect(":memory:", config=config)
-        self._connections.append(connection)
+        self._connections[connection] = spill
         create_views(connection, self.tables)
         connection.execute("SET enable_external_access = false")
         connection.execute("SET lock_configuration = true")
         return connection
 
+    def disconnect(self, connection: duckdb.DuckDBPyConnection) -> None:
+        """Close a connection that ``connect`` made, and remove what it spilled."""
+        connection.close()
+        spill = self._connections.pop(connection, None)
+        if spill is not None:
+            shutil.rmtree(spill, ignore_errors=True)
+
     def close(self) -> None:
         """Close all connections and remove what they spilled."""
-        for connection in self._connections:
-            connection.close()
+        for connection in list(self._connections):
+            self.disconnect(connection)
         self._own = None
         self.tables = {}
         shutil.rmtree(self._spill, ignore_errors=True)

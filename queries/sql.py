@@ -43,12 +43,12 @@ def stream(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> Iterat
         yield _answer(connection, text)
     except (duckdb.Error, pa.ArrowException, OSError) as error:
         if timed_out.is_set():
-            raise QueryTimeout(f"the query was stopped after {time_limit:g} seconds: ask for less, or raise the time limit") from None
+            raise QueryTimeout(f"the query was stopped after {time_limit:g} seconds: ask for less, or raise the time limit (--time-limit)") from None
         raise QueryError(str(error)) from None
     finally:
         if timer:
             timer.cancel()
-        connection.close()
+        run.disconnect(connection)
 
 
 def query(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> pa.Table:

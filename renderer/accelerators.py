@@ -12,7 +12,6 @@ from renderer.shapes.surface import plane_distances
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
-FAR = np.float32(1e30)  # beyond any scene; embree wants a finite distance
 
 
 class Accelerators:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from renderer.accelerators import FAR, Accelerators
+from renderer.accelerators import Accelerators
 from renderer.film import Film
 from renderer.integrators.buffers import Counters, TileBuffers, grow
 from renderer.integrators.connect import connect, keep_blocked
@@ -21,6 +21,7 @@ from renderer.integrators.estimators import estimator
 from renderer.integrators.record import Recorder, used_words
 from renderer.kernel import kernel
 from renderer.math.hash import GOLDEN, mix64
+from renderer.math.vec import FAR
 from renderer.samples import primary_samples
 from renderer.scene.arrays import Scene
 from renderer.settings import TraceSettings

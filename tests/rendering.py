@@ -94,9 +94,7 @@ def with_all_features(scene: Scene) -> Scene:
         np.zeros((0, 2), np.int32),
         np.zeros((0, 3), np.float32),
     )
-    no_environment = Environment(
-        np.zeros((1, 1, 3), np.float32), np.zeros(2, np.float32), np.zeros((1, 2), np.float32), np.eye(3, dtype=np.float32)
-    )
+    no_environment = Environment(np.zeros((1, 1, 3), np.float32), np.zeros(2, np.float32), np.zeros((1, 2), np.float32), np.eye(3, dtype=np.float32))
 
     def given(piece: Any, otherwise: Any) -> Any:
         return otherwise if piece is None else piece

@@ -18,8 +18,10 @@ AREA_RECTANGLE, AREA_MESH, AREA_SPHERE, AREA_DISK, AREA_CYLINDER, POINT, SPOT, D
 # Columns of Emitters.frame where the kind is AREA_RECTANGLE: corner, two edges, unit normal (12 numbers).
 # Other kinds: the rows of a 3 x 4 to_world matrix (point: its last column is the position; directional, spot: third
 # column is the unit direction of travel).
-# Columns of Emitters.scalar:
-AREA, PRIMITIVE_FIRST, PRIMITIVE_COUNT, CDF_FIRST, COS_CUTOFF, COS_BEAM, OFFSET = range(7)
+# Columns of Emitters.scalar. A spot's angles are kept as 1 - cos, which float32 holds for the narrowest cones too.
+AREA, CUTOFF, BEAM = range(3)
+# Columns of Emitters.primitive
+PRIMITIVE_FIRST, PRIMITIVE_COUNT, CDF_FIRST = range(3)
 
 
 class Environment(NamedTuple):
@@ -42,8 +44,8 @@ class Emitters(NamedTuple):
     rgb: npt.NDArray[np.float32]  # (ne, 3) radiance, intensity, irradiance or (envmap) the scale of its pixels
     texture: npt.NDArray[np.int32]  # (ne,) of the radiance, -1: constant
     frame: npt.NDArray[np.float32]  # (ne, 12)
-    scalar: npt.NDArray[np.float32]  # (ne, 7)
-    primitive: npt.NDArray[np.int32]  # (ne, 2) first primitive and count of an area emitter's shape
+    scalar: npt.NDArray[np.float32]  # (ne, 3)
+    primitive: npt.NDArray[np.int32]  # (ne, 3) first primitive and count of an area emitter's shape, where its cdf starts
     cdf: npt.NDArray[np.float32] | None  # all area meshes' cumulative areas, normalized, each with its leading 0
     bounds: npt.NDArray[np.float32]  # (4,) center and radius of the sphere around the scene
     infinite: Any  # int32, row of the constant or envmap emitter, -1: none

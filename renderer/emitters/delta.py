@@ -2,14 +2,13 @@
 
 import numpy as np
 
-from renderer.emitters.base import COS_BEAM, COS_CUTOFF, DIRECTIONAL, NO_DIRECTION, SPOT, DirectionSample, Emitters
+from renderer.emitters.base import BEAM, CUTOFF, DIRECTIONAL, NO_DIRECTION, SPOT, DirectionSample, Emitters
 from renderer.kernel import kernel
-from renderer.math.vec import BLACK, ONE, TWO_PI, ZERO, Vec3, dot, neg, row, scale, sub, tangents, to_world
+from renderer.math.vec import BLACK, FAR, HALF, ONE, TWO, TWO_PI, ZERO, Vec3, dot, neg, row, scale, sub, tangents, to_world
 from renderer.math.warp import sample_sphere
 from renderer.shapes.base import Index
 
 FOUR_PI = np.float32(4 * np.pi)
-BEYOND = np.float32(1e30)  # the distance of what is infinitely far
 
 
 @kernel
@@ -25,6 +24,12 @@ def axis(emitters: Emitters, emitter: Index) -> Vec3:
 
 
 @kernel
+def angle_of(versine: np.float32) -> np.float32:
+    """The angle whose 1 - cos is ``versine``, accurate where that is tiny."""
+    return np.float32(TWO * np.arcsin(min(ONE, np.sqrt(HALF * versine))))
+
+
+@kernel
 def falloff(emitters: Emitters, emitter: Index, d: Vec3) -> np.float32:
     """The share of a point or spot light's intensity that leaves along unit ``d``.
 
@@ -32,15 +37,16 @@ def falloff(emitters: Emitters, emitter: Index, d: Vec3) -> np.float32:
     """
     if emitters.kind[emitter] != SPOT:
         return ONE
-    cos_theta = min(dot(d, axis(emitters, emitter)), ONE)
-    cos_cutoff = emitters.scalar[emitter, COS_CUTOFF]
-    cos_beam = emitters.scalar[emitter, COS_BEAM]
-    if cos_theta <= cos_cutoff:
+    off_axis = sub(d, axis(emitters, emitter))
+    versine = HALF * dot(off_axis, off_axis)
+    cutoff = emitters.scalar[emitter, CUTOFF]
+    beam = emitters.scalar[emitter, BEAM]
+    if versine >= cutoff:
         return ZERO
-    if cos_theta >= cos_beam:
+    if versine <= beam:
         return ONE
-    cutoff = np.arccos(cos_cutoff)
-    return np.float32((cutoff - np.arccos(cos_theta)) / (cutoff - np.arccos(cos_beam)))
+    edge = angle_of(cutoff)
+    return np.float32((edge - angle_of(versine)) / (edge - angle_of(beam)))
 
 
 @kernel
@@ -50,7 +56,7 @@ def sample_delta(delta: bool | None, emitters: Emitters, emitter: Index, p: Vec3
         return NO_DIRECTION
     if emitters.kind[emitter] == DIRECTIONAL:
         d = neg(axis(emitters, emitter))
-        return DirectionSample(np.int32(emitter), d, d, BEYOND, scale(row(emitters.rgb, emitter), ONE / select), ZERO)
+        return DirectionSample(np.int32(emitter), d, d, FAR, scale(row(emitters.rgb, emitter), ONE / select), ZERO)
     endpoint = position(emitters, emitter)
     to_light = sub(endpoint, p)
     squared_distance = dot(to_light, to_light)
@@ -69,7 +75,7 @@ def sample_delta_direction(delta: bool | None, emitters: Emitters, emitter: Inde
         return BLACK, BLACK
     if emitters.kind[emitter] != SPOT:
         return sample_sphere(u, v), scale(row(emitters.rgb, emitter), FOUR_PI)
-    spread = ONE - emitters.scalar[emitter, COS_CUTOFF]
+    spread = emitters.scalar[emitter, CUTOFF]
     one_minus_cos = u * spread
     sin_theta = np.sqrt(max(ZERO, one_minus_cos * (ONE + ONE - one_minus_cos)))
     phi = TWO_PI * v

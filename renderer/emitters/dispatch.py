@@ -51,7 +51,7 @@ def pdf_direction(
 ) -> np.float32:
     """Density per steradian with which ``sample_direction`` finds the point of an area emitter that a ray from ``p`` met.
 
-    ``p`` is the same point that ``sample_direction`` would be given, ``distance`` is from there to the light's point,
+    ``p`` is the point that ``sample_direction`` would be given, to a ray's offset; ``distance`` is from there to the light's point,
     ``cos_light`` the cosine there between the light's geometric normal and -d. Zero behind the light.
     """
     select = ONE / np.float32(emitters.kind.shape[0])

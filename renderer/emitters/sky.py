@@ -3,10 +3,9 @@
 import numpy as np
 
 from renderer.emitters.base import CONSTANT, NO_DIRECTION, DirectionSample, Emitters
-from renderer.emitters.delta import BEYOND
 from renderer.emitters.envmap import environment_pdf, environment_radiance, sample_environment
 from renderer.kernel import kernel
-from renderer.math.vec import BLACK, ONE, ZERO, Vec3, mul, row, scale
+from renderer.math.vec import BLACK, FAR, ONE, ZERO, Vec3, mul, row, scale
 from renderer.math.warp import sample_sphere
 
 UNIFORM_SPHERE = np.float32(1 / (4 * np.pi))
@@ -53,4 +52,4 @@ def sample_sky_direction(sky: bool | None, emitters: Emitters, u: np.float32, v:
     pdf = density * select
     if pdf <= ZERO:
         return NO_DIRECTION
-    return DirectionSample(np.int32(emitters.infinite), d, d, BEYOND, scale(radiance, ONE / pdf), pdf)
+    return DirectionSample(np.int32(emitters.infinite), d, d, FAR, scale(radiance, ONE / pdf), pdf)

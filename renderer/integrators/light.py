@@ -1,7 +1,8 @@
 """Light tracing: the dual of path tracing, on the same steps (thesis 5.11.3).
 
 Light walks leave the emitters and scatter by the adjoint BSDF; each of their vertices is connected to the lens. There is
-no competing technique, so every weight is one. What only a chain of delta lobes joins to the lens stays unseen.
+no competing technique, so every weight is one. What only a chain of delta lobes joins to the lens stays unseen, and so does an
+infinite emitter that the camera sees directly.
 """
 
 import numpy as np
@@ -11,11 +12,11 @@ from renderer.bsdfs.base import DIFFUSE
 from renderer.bsdfs.dispatch import eval_bsdf_lobe, load_bsdf, lobe_count, sample_bsdf
 from renderer.emitters.dispatch import emission_toward, sample_emission
 from renderer.integrators.buffers import Counters, Lanes, PathRows, Rays, ShadowRays, VertexRows, WordRows
-from renderer.integrators.path import FAR, NEVER_MORE_THAN, finite, lens_numbers
+from renderer.integrators.path import NEVER_MORE_THAN, carries_light, lens_numbers
 from renderer.integrators.rows import append_path, append_ray, append_shadow_ray, append_vertex, append_word, set_surface_point
 from renderer.kernel import kernel
 from renderer.math.hash import extend_word
-from renderer.math.vec import HALF, ONE, ZERO, Vec3, dot, max3, mul, neg, row, scale, sub, to_local, to_world
+from renderer.math.vec import FAR, HALF, ONE, ZERO, Vec3, dot, max3, mul, neg, row, scale, sub, to_local, to_world
 from renderer.samples import (
     DIRECT_POINT,
     DIRECTION,
@@ -96,12 +97,12 @@ def start_light_walks(
         lens = sample_lens(sensor, light.point, u, v)
         if lens.visible and thing != NO_OBJECT:
             c = scale(emission_toward(emitters, scene.textures, light, lens.d), lens.importance * share)
-            if finite(c):
+            if carries_light(c):
                 paths.raster[n_paths, 0] = lens.raster_x
                 paths.raster[n_paths, 1] = lens.raster_y
                 n_paths = append_path(paths, n_paths, i, n_shadow, LENS_SAMPLE, 0, EMITTER, ROOT, light.emitter, lens.point, c, ONE)
                 n_shadow = append_shadow_ray(shadow, n_shadow, light.point, sub(lens.point, light.point), lens.free / lens.distance)
-        if max_depth > 1 and finite(light.weight):
+        if max_depth > 1 and carries_light(light.weight):
             t[n_rays] = FAR
             n_rays = append_ray(rays, n_rays, i, light.point, light.d, light.weight, ZERO, ONE, ROOT)
     return Counters(n_rays, n_shadow, n_vertices, n_paths, 0)
@@ -181,7 +182,7 @@ def interact_light(
                     for lobe in range(lobes):
                         lobe_event, value, _ = eval_bsdf_lobe(scene.families, scene.materials.tables, m, lobe, wi, wo, True)
                         c = scale(mul(beta, value), lens.importance * correction * share)
-                        if finite(c):
+                        if carries_light(c):
                             end = word
                             if kept:
                                 end = extend_word(word, lobe_event, thing)
@@ -208,7 +209,7 @@ def interact_light(
                 local = (s.wo[0], s.wo[1], s.wo[2] * flip)
                 wo = to_world(hit.s, hit.t, hit.n, local)
                 gain = scale(s.weight, shading_correction(geometry.normals, back, wo, hit.ng, wi_cos, local[2]))
-                if not finite(mul(beta, gain)):
+                if not carries_light(mul(beta, gain)):
                     event = ABSORBED
 
                 # ---- Russian roulette, by what this bounce keeps ----

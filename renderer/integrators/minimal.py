@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from renderer.bsdfs.dispatch import eval_bsdf_lobe, load_bsdf, lobe_count, sample_bsdf
 from renderer.emitters.dispatch import emitted, pdf_direction, sample_direction, sky_pdf, sky_radiance
-from renderer.math.vec import to_local, to_world
+from renderer.math.vec import FAR, to_local, to_world
 from renderer.samples import (
     DIRECT_CHOICE,
     DIRECT_POINT,
@@ -133,7 +133,7 @@ class MinimalPathTracer:
 
     def sees(self, start: Any, light: Any) -> bool:
         """Whether nothing lies between ``start`` and the sampled light."""
-        if light.distance >= 1e30:
+        if light.distance >= FAR:
             return bool(self.closest(start, light.d, np.inf)[0] < 0)
         segment = np.subtract(light.endpoint, start)
         return bool(self.closest(start, tuple(segment), 1.0)[0] < 0)
@@ -153,7 +153,7 @@ class MinimalPathTracer:
             inside = (b1 >= 0) & (b2 >= 0) & (b1 + b2 <= 1) & (t > 0) & (t < far)
         t = np.where(inside, t, np.inf)
         nearest = int(t.argmin()) if len(t) else -1
-        best = np.array([min(t[nearest] if len(t) else np.inf, far, 1e30)], np.float32)
+        best = np.array([min(t[nearest] if len(t) else np.inf, far, FAR)], np.float32)
         primitive = np.array([nearest if len(t) and inside[nearest] else -1], np.int32)
         if g.quadrics is not None:
             origin = np.asarray(o, np.float32)[None]

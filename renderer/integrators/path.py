@@ -14,7 +14,7 @@ from renderer.integrators.buffers import Counters, Lanes, PathRows, Rays, Shadow
 from renderer.integrators.rows import append_path, append_ray, append_shadow_ray, append_vertex, append_word, set_surface_point
 from renderer.kernel import kernel
 from renderer.math.hash import extend_word
-from renderer.math.vec import HALF, ONE, ZERO, Vec3, dot, max3, mul, neg, row, scale, sub, to_local, to_world
+from renderer.math.vec import FAR, HALF, ONE, ZERO, Vec3, dot, max3, mul, neg, row, scale, sub, to_local, to_world
 from renderer.samples import (
     DIRECT_CHOICE,
     DIRECT_POINT,
@@ -29,7 +29,7 @@ from renderer.samples import (
     walk_samples,
 )
 from renderer.scene.arrays import SceneArrays
-from renderer.sensors.dispatch import clip_distance, sample_ray
+from renderer.sensors.dispatch import back_to_lens, clip_distance, sample_ray
 from renderer.shapes.surface import offset_point, surface
 from renderer.tables import (
     ABSORBED,
@@ -43,10 +43,10 @@ from renderer.tables import (
     NO_OBJECT,
     ROULETTE,
 )
+from renderer.tables import LENS as LENS_POINT
 
 ROOT = np.uint64(CAMERA_ROOT)
 NEVER_MORE_THAN = np.float32(0.95)  # survival probability of Russian roulette, as in Mitsuba
-FAR = np.float32(1e30)
 
 
 @kernel
@@ -60,8 +60,8 @@ def power_heuristic(p: np.float32, q: np.float32) -> np.float32:
 
 
 @kernel
-def finite(c: Vec3) -> bool:
-    """Whether a color is a number, and not black."""
+def carries_light(c: Vec3) -> bool:
+    """Whether a color is a number and not black. What is 1e30 or more came of a division by nearly zero, and is dropped."""
     m = c[0] + c[1] + c[2]
     return bool(m > ZERO and m < FAR)
 
@@ -90,6 +90,7 @@ def start_camera_walks(
 ) -> Counters:
     """Give each of the first n lanes its film position, strictly inside its pixel, and its ray (``integrators.base``)."""
     sensor = scene.sensor
+    n_vertices = 0
     for i in range(n):
         walk = lanes.walk[i]
         numbers = walk_samples(samples, walk)
@@ -115,7 +116,11 @@ def start_camera_walks(
         lanes.radiance[i, 1] = ZERO
         lanes.radiance[i, 2] = ZERO
         append_ray(rays, i, i, o, d, (ONE, ONE, ONE), ZERO, ONE, ROOT)
-    return Counters(n, 0, 0, 0, 0)
+
+        # a point of the lens that was sampled is a vertex of the walk: depth 0
+        if sensor.lens_radius is not None and recording and lanes.recorded[i] != 0:
+            n_vertices = append_vertex(vertices, n_vertices, i, 0, LENS_POINT, NO_OBJECT, back_to_lens(sensor, o, d), (ONE, ONE, ONE))
+    return Counters(n, 0, n_vertices, 0, 0)
 
 
 @kernel
@@ -164,7 +169,7 @@ def interact(
                 if last_pdf > ZERO:
                     weight = power_heuristic(last_pdf, sky_pdf(emitters, d))
                 c = scale(mul(beta, sky_radiance(emitters, d)), weight)
-                if finite(c):
+                if carries_light(c):
                     n_paths = append_path(paths, n_paths, lane, -1, EMITTER_HIT, depth, EMITTER, word, emitters.infinite, d, c, weight)
             continue
 
@@ -181,7 +186,7 @@ def interact(
             if last_pdf > ZERO:
                 weight = power_heuristic(last_pdf, pdf_direction(emitters, geometry, emitter, o, d, t[i], cos_light, primitive))
             c = scale(mul(beta, emitted(emitters, textures, emitter, hit.u, hit.v)), weight)
-            if finite(c):
+            if carries_light(c):
                 n_paths = append_path(paths, n_paths, lane, -1, EMITTER_HIT, depth, EMITTER, word, emitter, hit.p, c, weight)
 
         # ---- materials: two-sided ones shade their back as a front ----
@@ -218,7 +223,7 @@ def interact(
                         if light.pdf > ZERO:
                             weight = power_heuristic(light.pdf, pdf)
                         c = scale(mul(mul(beta, value), light.weight), weight)
-                        if finite(c):
+                        if carries_light(c):
                             end = word
                             if kept:
                                 end = extend_word(word, lobe_event, thing)
@@ -242,7 +247,7 @@ def interact(
             s = sample_bsdf(scene.families, scene.materials.tables, m, wi, u_lobe, u, v, False)
             event = s.event
             throughput = mul(beta, s.weight)
-            if not finite(throughput):
+            if not carries_light(throughput):
                 event = ABSORBED
 
             # ---- Russian roulette ----

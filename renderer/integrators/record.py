@@ -139,11 +139,18 @@ class Recorder:
         return self._batch(table.name, columns, total)
 
     def words(self, rows: list[tuple[npt.NDArray[Any], ...]]) -> pa.RecordBatch:
-        """All distinct words of the given (word, parent, event, object) columns, in order of the word."""
+        """All distinct words of the given (word, parent, event, object) columns, in order of the word.
+
+        Raises RuntimeError where two prefixes have one hash: some 2^-64 for each pair of them.
+        """
         columns = [np.concatenate(parts) for parts in zip(*rows)] if rows else [np.zeros(0, t) for t in (np.uint64, np.uint64, np.uint8, np.uint16)]
-        word, first = np.unique(columns[0], return_index=True)
-        arrays = [word, *(np.ascontiguousarray(c[first]) for c in columns[1:])]
-        return pa.record_batch([pa.array(a) for a in arrays], schema=self.schemas[WORDS.name])
+        order = np.argsort(columns[0], kind="stable")
+        columns = [c[order] for c in columns]
+        repeats = columns[0][1:] == columns[0][:-1]
+        if any((repeats & (c[1:] != c[:-1])).any() for c in columns[1:]):
+            raise RuntimeError("two walk prefixes have the same hash: render again with another seed")
+        first = np.concatenate([[True], ~repeats])[: len(order)]
+        return pa.record_batch([pa.array(c[first]) for c in columns], schema=self.schemas[WORDS.name])
 
     def _order(self, lane: npt.NDArray[np.int32], n: int, n_lanes: int, recorded: npt.NDArray[np.uint8]) -> int:
         if len(self._position) < n:

@@ -15,6 +15,7 @@ TWO = np.float32(2.0)
 PI = np.float32(np.pi)
 TWO_PI = np.float32(2 * np.pi)
 INV_PI = np.float32(1 / np.pi)
+FAR = np.float32(1e30)  # beyond any scene: the distance of what is infinitely far (embree wants finite ones)
 BLACK = (ZERO, ZERO, ZERO)
 WHITE = (ONE, ONE, ONE)
 

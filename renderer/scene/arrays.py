@@ -75,6 +75,8 @@ class RenderDefaults:
     method: str  # "path" or "light"
     max_depth: int  # Mitsuba's meaning; -1 is unbounded
     rr_depth: int
+    sampler: str = "sobol"  # "independent" where the scene names that one
+    seed: int = 0
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,9 @@ from renderer.scene.sensors import FILMS, SAMPLERS, SENSORS, read_sensor
 from renderer.scene.shapes import SHAPES
 from renderer.scene.spectra import COLORS
 from renderer.scene.textures import TEXTURES
+from renderer.tables import NO_OBJECT
 
+MOST_SHAPES = NO_OBJECT  # object ids are uint16 in the tables, of which the last one means none
 INTEGRATORS = {"path": "path", "ptracer": "light"}
 KNOWN = (*SHAPES, *BSDFS, *TEXTURES, *COLORS, *EMITTERS, *SENSORS, *FILMS, *SAMPLERS, *INTEGRATORS)
 
@@ -45,6 +47,8 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
         surfaces[-1] = sound_surface(surfaces[-1], node, context)
         area_nodes.append(light[0] if light else None)
         sides.append(Sides(-1, -1, False, "none") if light and not bsdf else materials.sides(bsdf[0] if bsdf else None))
+    if len(surfaces) > MOST_SHAPES:
+        raise SceneError(f"the scene has {len(surfaces)} shapes; at most {MOST_SHAPES} can be told apart: merge some into one mesh", root.place)
     if not surfaces:
         raise SceneError(f"the scene has no shape; supported: {listing(SHAPES)}", root.place)
 
@@ -61,7 +65,7 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
     lights += [free_light(node, context) for node in parts["emitters"]]
     check_lights(lights, root, parts, context)
 
-    sensor, film, samples = read_sensor(one_sensor(parts["sensors"], root), context)
+    sensor, film, sampling = read_sensor(one_sensor(parts["sensors"], root), context)
     warn_of_inside(sensor, parts["shapes"], surfaces, sides, materials, context)
     method, max_depth, rr_depth = read_integrator(parts["integrators"])
     infos = object_infos(parts["shapes"], surfaces, sides)
@@ -78,7 +82,9 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
         arrays=arrays,
         objects=infos,
         emitters=tuple(light.info for light in lights),
-        defaults=RenderDefaults(film.width, film.height, film.filter, samples, method, max_depth, rr_depth),
+        defaults=RenderDefaults(
+            film.width, film.height, film.filter, sampling.samples, method, max_depth, rr_depth, sampling.sampler, sampling.seed
+        ),
         vertices=assembly.vertices,
         triangles=assembly.triangles,
         description=plain(root, shared),
@@ -140,6 +146,8 @@ def read_integrator(nodes: list[Node]) -> tuple[str, int, int]:
         raise SceneError("the scene has more than one integrator", nodes[1].place)
     reader = Reader(nodes[0] if nodes else Node("path", "integrator", ""))
     max_depth, rr_depth = reader.integer("max_depth", -1, -1), reader.integer("rr_depth", 5, 1)
+    if max_depth == 0:
+        raise reader.error("'max_depth' must be 1 or more, or -1 for no bound: no path has 0 segments", "max_depth")
     if reader.flag("hide_emitters", False):
         raise reader.error("'hide_emitters' is not supported; leave it out", "hide_emitters")
     reader.ignore("samples_per_pass", "block_size", "timeout")

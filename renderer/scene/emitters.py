@@ -15,13 +15,12 @@ from renderer.emitters.base import (
     AREA_MESH,
     AREA_RECTANGLE,
     AREA_SPHERE,
+    BEAM,
     CDF_FIRST,
     CONSTANT,
-    COS_BEAM,
-    COS_CUTOFF,
+    CUTOFF,
     DIRECTIONAL,
     ENVMAP,
-    OFFSET,
     POINT,
     PRIMITIVE_COUNT,
     PRIMITIVE_FIRST,
@@ -78,7 +77,7 @@ def spot_light(reader: Reader, info: EmitterInfo, context: Context) -> Light:
     cutoff = reader.number("cutoff_angle", 20.0, above=0, high=180)
     beam = reader.number("beam_width", cutoff * 0.75, low=0, high=cutoff)
     to_world = transforms.without_scale(reader.transform("to_world"))
-    scalar = {COS_CUTOFF: math.cos(math.radians(cutoff)), COS_BEAM: math.cos(math.radians(beam))}
+    scalar = {CUTOFF: 2 * math.sin(math.radians(cutoff) / 2) ** 2, BEAM: 2 * math.sin(math.radians(beam) / 2) ** 2}
     return Light(SPOT, info, color(reader, "intensity", 1.0, bounded=False), frame=to_world[:3].reshape(-1), scalar=scalar)
 
 
@@ -152,8 +151,6 @@ def area_light(node: Node, object_index: int, name: str, surface: Surface, assem
     first, count = assembly.first[object_index], assembly.count[object_index]
     info = EmitterInfo(name, "area", object_index, False, "L")
     light = Light(AREA_MESH, info, rgb, texture, primitive=(first, count))
-    offsets = assembly.geometry.offset[first : first + count]
-    light.scalar = {PRIMITIVE_FIRST: first, PRIMITIVE_COUNT: count, OFFSET: float(offsets.max())}
     if not isinstance(surface, Mesh):
         light.kind = AREA_KINDS[surface.kind]
         light.frame = surface.to_world[:3].reshape(-1)
@@ -177,12 +174,14 @@ def area_light(node: Node, object_index: int, name: str, surface: Surface, assem
 def pack_emitters(lights: list[Light], bounds: tuple[Any, Any]) -> Emitters:
     """The emitter table as kernels read it; ``bounds`` are the scene's."""
     n = len(lights)
-    scalar = np.zeros((n, 7), np.float32)
+    scalar = np.zeros((n, 3), np.float32)
+    primitive = np.zeros((n, 3), np.int32)
     cdfs: list[npt.NDArray[np.float64]] = []
     for i, light in enumerate(lights):
         if light.cdf is not None:
-            light.scalar[CDF_FIRST] = sum(len(c) for c in cdfs)
+            primitive[i, CDF_FIRST] = sum(len(c) for c in cdfs)
             cdfs.append(light.cdf)
+        primitive[i, [PRIMITIVE_FIRST, PRIMITIVE_COUNT]] = light.primitive
         for column, value in light.scalar.items():
             scalar[i, column] = value
     kinds = {light.kind for light in lights}
@@ -195,7 +194,7 @@ def pack_emitters(lights: list[Light], bounds: tuple[Any, Any]) -> Emitters:
         np.array([light.texture for light in lights], np.int32),
         np.array([light.frame for light in lights], np.float32),
         scalar,
-        np.array([light.primitive for light in lights], np.int32),
+        primitive,
         np.concatenate(cdfs).astype(np.float32) if cdfs else None,
         sphere,
         np.int32(next((i for i, light in enumerate(lights) if light.kind in (CONSTANT, ENVMAP)), -1)),

@@ -52,10 +52,12 @@ class Quadric:
 
     def area(self) -> float:
         """Surface area (of a cylinder: its lateral surface)."""
-        a, b, c = (float(np.linalg.norm(self.to_world[:3, i])) for i in range(3))
+        a, c = (float(np.linalg.norm(self.to_world[:3, i])) for i in (0, 2))
         if self.kind == SPHERE:
             return 4 * np.pi * a * a
-        return np.pi * a * b if self.kind == DISK else 2 * np.pi * a * c
+        if self.kind == DISK:
+            return float(np.pi * np.linalg.norm(np.cross(self.to_world[:3, 0], self.to_world[:3, 1])))
+        return 2 * np.pi * a * c
 
     def bounds(self) -> Bounds:
         """The tight box around the shape."""

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +20,7 @@ FILMS = ("hdrfilm",)
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 FOV_AXES = ("x", "y", "diagonal", "smaller", "larger")
 FULL_FRAME_DIAGONAL = math.hypot(36, 24)  # mm, of the 35 mm film that focal lengths refer to
-LARGEST_FILM = 65536
+LARGEST_FILM = 65535  # pixels across
 FILTER_SETTINGS = {"gaussian": {"stddev": 0.5}, "mitchell": {"A": 1 / 3, "B": 1 / 3, "C": 1 / 3}, "lanczos": {"lobes": 3.0}, "tent": {"radius": 1.0}}
 
 
@@ -53,15 +54,24 @@ def read_film(node: Node | None) -> Film:
     return Film(width, height, name)
 
 
-def read_samples(node: Node | None, context: Context) -> int:
-    """Samples for each pixel; Mitsuba's default where there is no sampler."""
+class Sampling(NamedTuple):
+    """Samples for each pixel, how they are placed ("independent" or "sobol"), and the seed of their numbers."""
+
+    samples: int
+    sampler: str
+    seed: int
+
+
+def read_sampler(node: Node | None, context: Context) -> Sampling:
+    """A sampler; Mitsuba's number of samples, placed by ``sobol``, where there is none."""
     reader = Reader(node or Node("independent", "sampler", ""))
     count = reader.integer("sample_count", 4, 1, 2**31 - 1)
-    reader.ignore("seed", "jitter", "strength")
+    seed = reader.integer("seed", 0, 0, 2**63 - 1)
+    reader.ignore("jitter", "strength")
     reader.finish()
     if node is not None and node.plugin != "independent":
-        context.warn(f"the sampler {node.plugin!r} gives the number of samples only; the job says how they are placed", node.place)
-    return count
+        context.warn(f"the sampler {node.plugin!r} gives the number of samples only; they are placed by 'sobol', or as the job says", node.place)
+    return Sampling(count, "sobol" if node is None or node.plugin != "independent" else "independent", seed)
 
 
 def half_tangents(reader: Reader, film: Film) -> tuple[float, float]:
@@ -108,11 +118,11 @@ def camera_frame(reader: Reader) -> F64:
     return transforms.without_scale(to_world)
 
 
-def read_sensor(node: Node, context: Context) -> tuple[Sensor, Film, int]:
-    """A camera, its film, and its samples for each pixel."""
+def read_sensor(node: Node, context: Context) -> tuple[Sensor, Film, Sampling]:
+    """A camera, its film, and how it is sampled."""
     reader = Reader(node)
     films, samplers = reader.children(FILMS, "films"), reader.children(SAMPLERS, "samplers")
-    film, samples = read_film(films[0] if films else None), read_samples(samplers[0] if samplers else None, context)
+    film, sampling = read_film(films[0] if films else None), read_sampler(samplers[0] if samplers else None, context)
     to_world = camera_frame(reader)
     tan_x, tan_y = half_tangents(reader, film)
     near = reader.number("near_clip", 1e-2, above=0)
@@ -140,4 +150,4 @@ def read_sensor(node: Node, context: Context) -> tuple[Sensor, Film, int]:
         lens_radius,
         focus,
     )
-    return sensor, film, samples
+    return sensor, film, sampling

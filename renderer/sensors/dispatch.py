@@ -74,6 +74,13 @@ def sample_ray(sensor: Sensor, x: np.float32, y: np.float32, u: np.float32, v: n
 
 
 @kernel
+def back_to_lens(sensor: Sensor, o: Vec3, d: Vec3) -> Vec3:
+    """The point of the lens that a camera ray came through, from its start on the near clipping plane."""
+    cos_theta = sensor.to_world[0, 2] * d[0] + sensor.to_world[1, 2] * d[1] + sensor.to_world[2, 2] * d[2]
+    return madd(d, -sensor.near / cos_theta, o)
+
+
+@kernel
 def clip_distance(sensor: Sensor, d: Vec3) -> np.float32:
     """How far along unit ``d`` a camera ray reaches from the near to the far clipping plane."""
     cos_theta = sensor.to_world[0, 2] * d[0] + sensor.to_world[1, 2] * d[1] + sensor.to_world[2, 2] * d[2]

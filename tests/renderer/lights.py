@@ -11,7 +11,7 @@ from renderer.shapes.bounds import quadric_offsets, triangle_offsets
 F32 = np.float32
 ROWS = ("rectangle", "mesh", "sphere", "disk", "cylinder", "inside", "point", "spot", "directional", "constant")
 RADIANCE = np.array([1.0, 2.0, 3.0], F32)
-COS_CUTOFF, COS_BEAM = np.cos(np.radians(40)), np.cos(np.radians(25))
+CUTOFF, BEAM = 1 - np.cos(np.radians(40)), 1 - np.cos(np.radians(25))
 CENTER, RADIUS = np.array([0.2, 0.1, -0.3]), 6.0  # the sphere around the scene
 
 # A box whose six faces have unequal areas, as triangles with outward normals
@@ -69,14 +69,14 @@ def build(environment: bool = False) -> tuple[Emitters, Geometry]:
     kinds = [base.AREA_RECTANGLE, base.AREA_MESH, base.AREA_SPHERE, base.AREA_DISK, base.AREA_CYLINDER, base.AREA_SPHERE]
     kinds += [base.POINT, base.SPOT, base.DIRECTIONAL, base.ENVMAP if environment else base.CONSTANT]
     n = len(kinds)
-    scalar, frame = np.zeros((n, 7), F32), np.zeros((n, 12), F32)
+    scalar, frame = np.zeros((n, 3), F32), np.zeros((n, 12), F32)
     scalar[:6, base.AREA] = [areas[12:].sum(), areas[:12].sum(), 4 * np.pi * 0.81, np.pi * 1.21, 2 * np.pi * 0.6 * 1.4, 4 * np.pi * 2.89]
-    scalar[7, base.COS_CUTOFF], scalar[7, base.COS_BEAM] = COS_CUTOFF, COS_BEAM
+    scalar[7, base.CUTOFF], scalar[7, base.BEAM] = CUTOFF, BEAM
     frame[0] = np.concatenate([c, a, b, ng[12]])
     light = affine(rotation((1, 0.1, 0), 170), (0.4, -0.2, 2.0))[:3].ravel()
     frame[6:9] = light
-    primitive = np.zeros((n, 2), np.int32)
-    primitive[:6] = [(12, 2), (0, 12), (nt, 1), (nt + 1, 1), (nt + 2, 1), (nt + 3, 1)]
+    primitive = np.zeros((n, 3), np.int32)
+    primitive[:6, :2] = [(12, 2), (0, 12), (nt, 1), (nt + 1, 1), (nt + 2, 1), (nt + 3, 1)]
     cdf = np.concatenate([[0], np.cumsum(areas[:12]) / areas[:12].sum()]).astype(F32)
     sky = build_environment(sky_pixels(), rotation((0.3, 1, 0.2), 50))  # unused by a constant sky; one type, one compilation
     emitters = Emitters(

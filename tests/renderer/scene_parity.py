@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from renderer.accelerators import FAR, Accelerators
+from renderer.accelerators import Accelerators
 from renderer.kernel import kernel
-from renderer.math.vec import row
+from renderer.math.vec import FAR, row
 from renderer.scene.arrays import Scene
 from renderer.scene.to_mitsuba import mitsuba_dict
 from renderer.shapes.base import Geometry

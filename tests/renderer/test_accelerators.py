@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from renderer.accelerators import FAR, Accelerators
+from renderer.accelerators import Accelerators
+from renderer.math.vec import FAR
 from renderer.scene.arrays import Scene
 from renderer.scene.load import load_scene
 
@@ -22,7 +23,7 @@ def room(*, sphere: bool) -> Scene:
 
 def rays(n: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
-    o = rng.uniform(-3, 3, (n, 3)) + [0, 0, 3]
+    o = rng.uniform((-3, -3, 0), (3, 3, 6), (n, 3))
     d = rng.normal(size=(n, 3))
     return o.astype(np.float32), (d / np.linalg.norm(d, axis=1, keepdims=True)).astype(np.float32)
 

@@ -8,7 +8,8 @@ import scipy.integrate
 import scipy.stats
 from chi2 import Chart, chi_square_p_value, significance
 
-from renderer.emitters.base import COS_BEAM, COS_CUTOFF, Emitters
+from renderer.emitters.base import BEAM, CUTOFF, Emitters
+from renderer.emitters.delta import sample_delta_direction
 from renderer.emitters.dispatch import (
     emission_toward,
     emitted,
@@ -23,6 +24,7 @@ from renderer.emitters.envmap import build_environment
 from renderer.errors import SceneError
 from renderer.kernel import kernel
 from renderer.math.vec import cross, dot, row, sub
+from renderer.scene.load import load_scene
 from renderer.shapes.quadrics import intersect_quadric
 from renderer.shapes.surface import surface
 
@@ -312,7 +314,7 @@ def power(kind):
     if kind == "point":
         return 4 * np.pi
     if kind == "spot":
-        low, middle = EMITTERS.scalar[7, COS_CUTOFF], EMITTERS.scalar[7, COS_BEAM]
+        low, middle = 1 - EMITTERS.scalar[7, [CUTOFF, BEAM]].astype(float)
         return 2 * np.pi * (scipy.integrate.quad(spot_falloff, low, middle)[0] + 1 - middle)
     if kind == "directional":
         return disk
@@ -430,3 +432,17 @@ def test_a_scene_of_rectangles_needs_nothing_else():
     assert sky_radiance(only, (F32(0), F32(0), F32(1))) == (0, 0, 0)
     assert sky_pdf(only, (F32(0), F32(0), F32(1))) == 0
     assert emitted(only, None, 0, F32(0.2), F32(0.2)) == tuple(lights.RADIANCE)
+
+
+@pytest.mark.parametrize("cutoff", [0.005, 0.1, 5.0])
+def test_narrow_spots_keep_their_flux(cutoff: float) -> None:
+    # a cone's solid angle is 2 pi (1 - cos): float32 cosines would lose it
+    spot = {"type": "spot", "cutoff_angle": cutoff, "beam_width": 0.0, "intensity": 1.0}
+    sensor = {"type": "perspective"}
+    scene = load_scene({"type": "scene", "sensor": sensor, "spot": spot, "floor": {"type": "rectangle"}}).arrays
+    u, v = np.random.default_rng(1).random((2, 4096)).astype(np.float32)
+    weights = np.array([sample_delta_direction(True, scene.emitters, 0, a, b)[1][0] for a, b in zip(u, v)])
+    edge = np.radians(cutoff)
+    flux = 2 * np.pi * scipy.integrate.quad(lambda angle: (1 - angle / edge) * np.sin(angle), 0, edge)[0]
+    assert abs(weights.mean() - flux) < 4 * weights.std() / np.sqrt(len(weights))
+    assert weights.mean() > 0.9 * flux

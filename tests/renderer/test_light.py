@@ -53,8 +53,7 @@ def through_rough_glass(folder: Folder) -> Dict:
 
 
 SCENES = {
-    f.__name__: f
-    for f in (diffuse_box, delta_lights, glowing_shapes, thin_lens, under_an_environment, under_a_sky_and_a_sun, through_rough_glass)
+    f.__name__: f for f in (diffuse_box, delta_lights, glowing_shapes, thin_lens, under_an_environment, under_a_sky_and_a_sun, through_rough_glass)
 }
 TESTS = len(SCENES) + 4 + 5
 

@@ -5,7 +5,9 @@ import pathlib
 import numpy as np
 import pytest
 
+from renderer.scene.geometry import Quadric
 from renderer.scene.load import load_scene
+from renderer.shapes.base import DISK
 from tests.renderer.scene_parity import compare
 from tests.scenes.files import write_obj, write_ply
 
@@ -112,3 +114,11 @@ def test_quadric_bounds_hold_their_points() -> None:
         assert (points >= np.array(low) - 1e-6).all()
         assert (points <= np.array(high) + 1e-6).all()
         assert np.abs(points.min(axis=0) - low).max() < 0.01 * size
+
+
+def test_area_of_a_sheared_disk() -> None:
+    shear = np.array([[1, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], float)
+    turn = np.linspace(0, 2 * np.pi, 100_001)
+    rim = shear[:2, :2] @ np.stack([np.cos(turn), np.sin(turn)])
+    polygon = 0.5 * abs(np.sum(rim[0, :-1] * rim[1, 1:] - rim[0, 1:] * rim[1, :-1]))
+    assert Quadric(DISK, shear).area() == pytest.approx(polygon, rel=1e-6)

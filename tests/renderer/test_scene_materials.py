@@ -21,7 +21,7 @@ from renderer.bsdfs.base import (
     TEXTURE_A,
     TEXTURE_ALPHA_U,
 )
-from renderer.emitters.base import AREA, AREA_CYLINDER, AREA_DISK, AREA_MESH, AREA_RECTANGLE, AREA_SPHERE, CDF_FIRST, COS_BEAM, COS_CUTOFF
+from renderer.emitters.base import AREA, AREA_CYLINDER, AREA_DISK, AREA_MESH, AREA_RECTANGLE, AREA_SPHERE, BEAM, CDF_FIRST, CUTOFF
 from renderer.scene.arrays import Scene
 from renderer.scene.load import load_scene
 from renderer.scene.metals import METALS
@@ -153,7 +153,7 @@ def test_area_emitters_by_shape() -> None:
     assert emitters.object.tolist() == [1, 2, 3, 4, 5, 6]
     assert scene.arrays.objects.emitter.tolist() == [-1, 0, 1, 2, 3, 4, 5]
     assert emitters.cdf is not None
-    first = int(emitters.scalar[5, CDF_FIRST])
+    first = int(emitters.primitive[5, CDF_FIRST])
     assert (emitters.cdf[0], emitters.cdf[12], emitters.cdf[first], emitters.cdf[-1]) == (0, 1, 0, 1)
     shares = np.diff(emitters.cdf[first : first + 13])
     p = scene.arrays.geometry
@@ -174,7 +174,7 @@ def test_free_emitters(session_folder: pathlib.Path) -> None:
     emitters = scene.arrays.emitters
     assert emitters.frame[0].reshape(3, 4)[:, 3].tolist() == [1, 2, 3]
     assert emitters.frame[1].reshape(3, 4)[:, 2].tolist() == pytest.approx([0, 0, -1])
-    assert emitters.scalar[1, [COS_CUTOFF, COS_BEAM]].tolist() == pytest.approx([math.cos(math.radians(40)), math.cos(math.radians(30))])
+    assert emitters.scalar[1, [CUTOFF, BEAM]].tolist() == pytest.approx([1 - math.cos(math.radians(40)), 1 - math.cos(math.radians(30))])
     assert emitters.frame[2].reshape(3, 4)[:, 2].tolist() == pytest.approx([0, -1, 0])
     assert emitters.rgb[3].tolist() == [0.5, 0.5, 0.5]
     assert emitters.infinite == 3

@@ -137,6 +137,7 @@ def test_importance_is_the_dual_of_rays(kind):
 
     for column in (0, 1):
         for line in (0, 1):
+
             def quarter(r, column=column, line=line):
                 return ((r[:, 0] >= WIDTH / 2) == bool(column)) & ((r[:, 1] >= HEIGHT / 2) == bool(line))
 
