@@ -8,7 +8,7 @@ import platform
 from dataclasses import asdict
 from typing import Any
 
-import llvmlite.binding
+import llvmlite.binding  # type: ignore[import-untyped]
 import numpy as np
 
 from pipeline.config import Job

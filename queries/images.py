@@ -50,7 +50,7 @@ def _resolve(run: Run | str | os.PathLike[str], expression: Expression | None, t
 def _shard_groups(run: Run) -> list[range]:
     """The run's shards in runs of some ``_MAPPED_ROWS`` paths."""
     count: int = run.manifest["shards"]["count"]
-    step = max(1, count * _MAPPED_ROWS // max(1, run.manifest["rows"]["paths"]))
+    step = max(1, count * _MAPPED_ROWS // max(1, run.manifest["rows"].get("paths", 0)))
     return [range(first, min(first + step, count)) for first in range(0, count, step)]
 
 

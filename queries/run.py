@@ -29,7 +29,8 @@ class Run:
     """An open run: a context manager.
 
     ``path`` the folder, ``manifest`` its manifest, ``tables`` the stored Arrow tables by name (memory-mapped),
-    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which none sees another's changes; ``disconnect`` ends one.
+    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which
+    none sees another's changes; ``disconnect`` ends one.
     """
 
     def __init__(self, path: pathlib.Path, manifest: dict[str, Any], tables: dict[str, pa.Table], memory_limit: str, threads: int | None) -> None:

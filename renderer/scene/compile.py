@@ -82,9 +82,7 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
         arrays=arrays,
         objects=infos,
         emitters=tuple(light.info for light in lights),
-        defaults=RenderDefaults(
-            film.width, film.height, film.filter, sampling.samples, method, max_depth, rr_depth, sampling.sampler, sampling.seed
-        ),
+        defaults=RenderDefaults(film.width, film.height, film.filter, sampling.samples, method, max_depth, rr_depth, sampling.sampler, sampling.seed),
         vertices=assembly.vertices,
         triangles=assembly.triangles,
         description=plain(root, shared),

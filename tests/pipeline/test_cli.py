@@ -17,6 +17,7 @@ from tiny_job import results, write_job
 from typer.testing import CliRunner
 
 import pipeline.stages
+import queries.images
 from pipeline.cli import app
 from pipeline.images import read_exr
 
@@ -109,6 +110,7 @@ def test_export(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
         (["export", "nowhere", "--parquet", "x"], "nowhere"),
         (["run", "nowhere.yaml"], "no such job file"),
         (["run"], "Missing argument"),
+        (["sql", "RUN", "SELECT 1", "--time-limit", "0"], "--time-limit"),
         (["paint"], "No such command"),
         (["run", "job.yaml", "--threads", "0"], "--threads"),
     ],
@@ -120,6 +122,25 @@ def test_bad_input_exits_with_2(arguments: list[str], says: str, tiny_run: pathl
     assert says in result.stderr
     assert "Traceback" not in result.output
     assert not result.stdout
+
+
+def test_time_limit_of_a_query(tiny_run: pathlib.Path) -> None:
+    endless = "SELECT sum(a.i * b.i) FROM range(100000000) a(i), range(100000000) b(i)"
+    result = pathspace("sql", tiny_run, endless, "--time-limit", "1")
+    assert result.exit_code == 2
+    assert "stopped after 1 seconds: ask for less, or raise the time limit (--time-limit)" in result.stderr
+    assert pathspace("sql", tiny_run, "SELECT 1", "--time-limit", "100").exit_code == 0
+
+
+def test_expression_opens_a_large_run_some_shards_at_a_time(tiny_run: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = pathspace("lpe", tiny_run, "C D L")
+    opened: list[object] = []
+    real = queries.images.open_run
+    monkeypatch.setattr(queries.images, "_MAPPED_ROWS", 10_000)
+    monkeypatch.setattr(queries.images, "open_run", lambda *arguments: (opened.append(arguments[3:]), real(*arguments))[1])
+    parts = pathspace("lpe", tiny_run, "C D L")
+    assert parts.stdout == whole.stdout
+    assert len([shards for shards in opened if shards]) > 8
 
 
 def test_faults_exit_with_1(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,8 +5,10 @@ import pathlib
 
 import pytest
 import yaml
+from tiny_job import SCENE
 from typer.testing import CliRunner
 
+from pipeline.catalogues import run_row
 from pipeline.cli import app
 from pipeline.errors import JobError
 from pipeline.job_docs import job_docs
@@ -102,6 +104,53 @@ def test_resolution_changes_the_film_alone(tmp_path: pathlib.Path) -> None:
     assert (int(scene.arrays.sensor.width), int(scene.arrays.sensor.height)) == (64, 32)
     whole = prepare_job(ROOT / "configs/cornell.yaml").scene
     assert [o.name for o in scene.objects] == [o.name for o in whole.objects]
+
+
+def described(sampler: dict[str, object] | None, **integrator: object) -> dict[str, object]:
+    """The tiny scene with this sampler, and with these settings of its integrator."""
+    sensor = {**SCENE["sensor"], **({} if sampler is None else {"sampler": sampler})}
+    return {**SCENE, "sensor": sensor, "walks": {"type": "path", **integrator}}
+
+
+@pytest.mark.parametrize(
+    ("sampler", "render", "expected"),
+    [
+        (None, {}, ("sobol", 0)),
+        ({"type": "independent"}, {}, ("independent", 0)),
+        ({"type": "independent", "seed": 9}, {}, ("independent", 9)),
+        ({"type": "multijitter", "seed": 9}, {}, ("sobol", 9)),
+        ({"type": "independent", "seed": 9}, {"sampler": "sobol", "seed": 0}, ("sobol", 0)),
+        ({"type": "multijitter"}, {"sampler": "independent"}, ("independent", 0)),
+        ({"type": "independent", "seed": 9}, {"resolution": [8, 4]}, ("independent", 9)),
+    ],
+)
+def test_sampler_and_seed_are_the_scene_s_where_the_job_names_none(sampler, render: dict, expected: tuple[str, int], tmp_path: pathlib.Path) -> None:
+    path = job_file(tmp_path, yaml.safe_dump({"name": "a", "scene": described(sampler), "render": render}))
+    settings = prepare_job(path).settings
+    assert (settings.sampler, settings.seed) == expected
+
+
+@pytest.mark.parametrize(("asked", "expected"), [(3, 3), (255, 255), (256, 256), (100_000, 256)])
+def test_roulette_that_a_scene_puts_off_for_ever(asked: int, expected: int, tmp_path: pathlib.Path) -> None:
+    """No path is longer than 255 segments, so any greater depth is the same; it must fit into the table of the run."""
+    path = job_file(tmp_path, yaml.safe_dump({"name": "a", "scene": described(None, rr_depth=asked)}))
+    prepared = prepare_job(path)
+    assert prepared.settings.rr_depth == expected
+    assert run_row("a", prepared.settings, prepared.scene, {}, {})["rr_depth"].to_pylist() == [expected]
+
+
+@pytest.mark.parametrize(
+    ("scene", "says"),
+    [
+        (described(None, max_depth=0), "'max_depth' must be 1 or more, or -1"),
+        (described({"type": "independent", "seed": -1}), "'seed' must be from 0"),
+        ({**SCENE, "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 65536}}}, "'width' must be from 1 to 65535"),
+    ],
+    ids=["no depth", "negative seed", "film wider than a job may say"],
+)
+def test_scene_that_asks_for_what_no_job_may(scene: dict, says: str, tmp_path: pathlib.Path) -> None:
+    with pytest.raises(JobError, match=says):
+        prepare_job(job_file(tmp_path, yaml.safe_dump({"name": "a", "scene": scene})))
 
 
 def test_resized_gives_a_film_to_a_sensor_without_one() -> None:

@@ -73,6 +73,22 @@ def test_light_tracing_runs_end_to_end(tmp_path: pathlib.Path) -> None:
     assert read_exr(run / "images/beauty.exr").max() > 0
 
 
+@pytest.mark.parametrize("aovs", [{}, {"seen": "C L", "direct": "C D L"}], ids=["", "aovs"])
+@pytest.mark.parametrize("method", ["path", "light"])
+def test_run_in_which_nothing_scatters(method: str, aovs: dict[str, str], tmp_path: pathlib.Path) -> None:
+    """No walk has a word: the camera sees emitters alone."""
+    small = {"method": method, "max_depth": 1, "samples": 2, "resolution": [16, 16], "filter": "box"}
+    run = run_job(write_job(tmp_path, render=small, aovs=aovs), out=tmp_path / "run").path
+    rows = json.loads((run / "manifest.json").read_bytes())["rows"]
+    assert rows["words"] == 0
+    assert rows["paths"] > 0
+    pictures = {name: read_exr(run / f"images/{name}.exr") for name in ("beauty", *aovs)}
+    assert pictures["beauty"].max() > 0
+    if aovs:
+        assert np.allclose(pictures["seen"], pictures["beauty"])
+        assert not pictures["direct"].any()
+
+
 def test_lit_rows() -> None:
     film = np.zeros((5, 3, 4))
     assert lit_rows(film) == (0, 0)

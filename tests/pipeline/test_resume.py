@@ -131,6 +131,15 @@ def test_another_version_of_the_renderer_does_not_mix_in(tiny_run: pathlib.Path,
         run_job(write_job(tmp_path), out=out, resume=True)
 
 
+def test_another_kind_of_processor_does_not_mix_in(tiny_run: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "run"
+    shutil.copytree(tiny_run, out)
+    (out / "tables/paths/00001.arrow").unlink()
+    monkeypatch.setattr(pipeline.stages, "processor", lambda: "another")
+    with pytest.raises(RunFolderError, match=r"another kind of processor \(.+, this is another\)"):
+        run_job(write_job(tmp_path), out=out, resume=True)
+
+
 # --- folders that are not this run's ------------------------------------------------------------------------------
 
 

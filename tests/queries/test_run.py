@@ -10,7 +10,8 @@ import pytest
 from synthetic import SyntheticRun, make_run
 
 from queries import Run, open_run
-from queries.errors import RunError
+from queries.errors import QueryError, RunError
+from queries.sql import query
 from renderer.tables import LIGHT_VERTICES, OCCLUDED, PATHS
 
 VIEWS = {"camera_vertices", "light_vertices", "paths", "occluded", "words", "objects", "events", "emitters", "techniques", "triangles", "run"}
@@ -101,6 +102,17 @@ def test_the_spill_folder_is_removed(path_run: SyntheticRun) -> None:
     assert spill.is_dir()
     run.close()
     assert not spill.exists()
+
+
+def test_a_closed_connection_leaves_nothing(path_run: SyntheticRun) -> None:
+    with open_run(path_run.folder) as run:
+        own = pathlib.Path(run.connection.execute("SELECT current_setting('temp_directory')").fetchone()[0])  # type: ignore[index]
+        for _ in range(3):
+            query(run, "SELECT count(*) FROM paths")
+        with pytest.raises(QueryError):
+            query(run, "SELECT nothing")
+        assert list(own.parent.iterdir()) == [own]
+        assert run.connection.execute("SELECT count(*) FROM paths").fetchone() == (len(path_run.rows),)
 
 
 def test_queries_larger_than_memory_spill(path_run: SyntheticRun) -> None:
