@@ -21,6 +21,7 @@ from renderer.scene.textures import TEXTURES
 from renderer.tables import NO_OBJECT
 
 MOST_SHAPES = NO_OBJECT  # object ids are uint16 in the tables, of which the last one means none
+MOST_EMITTERS = 1 << 16  # emitter ids are uint16 too
 INTEGRATORS = {"path": "path", "ptracer": "light"}
 KNOWN = (*SHAPES, *BSDFS, *TEXTURES, *COLORS, *EMITTERS, *SENSORS, *FILMS, *SAMPLERS, *INTEGRATORS)
 
@@ -63,6 +64,8 @@ def compile_scene(root: Node, paths: Paths) -> Scene:
             emitter_of[i] = len(lights)
             lights.append(area_light(area, i, area.name if area.named else shape.name, surfaces[i], assembly, context))
     lights += [free_light(node, context) for node in parts["emitters"]]
+    if len(lights) > MOST_EMITTERS:
+        raise SceneError(f"the scene has {len(lights)} emitters; at most {MOST_EMITTERS} can be told apart", root.place)
     check_lights(lights, root, parts, context)
 
     sensor, film, sampling = read_sensor(one_sensor(parts["sensors"], root), context)

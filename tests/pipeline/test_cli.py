@@ -102,7 +102,7 @@ def test_export(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
     ("arguments", "says"),
     [
         (["sql", "RUN", "SELECT nothing FROM paths"], "nothing"),
-        (["sql", "RUN", "COPY paths TO '/tmp/x.csv'"], "read-only"),
+        (["sql", "RUN", "COPY paths TO 'x.csv'"], "read-only"),
         (["sql", "nowhere", "SELECT 1"], "nowhere"),
         (["info", "nowhere"], "not a run folder"),
         (["lpe", "RUN", "C (L"], "column"),

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from renderer.errors import SceneError
+from renderer.scene import compile
 from renderer.scene.load import load_scene
 from tests.renderer.test_scene_formats import XML, YAML
 
@@ -95,3 +96,14 @@ def test_damaged_files_give_scene_errors_only(name: str, text: str, tmp_path: pa
             refused.append(str(error))
     assert len(refused) > 200
     assert all(str(tmp_path / name) in message for message in refused)
+
+
+@pytest.mark.parametrize(("limit", "what"), [("MOST_SHAPES", "3 shapes"), ("MOST_EMITTERS", "2 emitters")])
+def test_more_than_the_tables_can_tell_apart(monkeypatch: pytest.MonkeyPatch, limit: str, what: str) -> None:
+    shapes = {name: {"type": "rectangle"} for name in ("floor", "wall", "lid")}
+    lamps = {name: {"type": "point", "position": [0, 0, 1]} for name in ("left", "right")}
+    scene = {"type": "scene", "sensor": {"type": "perspective"}, **shapes, **lamps}
+    load_scene(scene)
+    monkeypatch.setattr(compile, limit, int(what[0]) - 1)
+    with pytest.raises(SceneError, match=what):
+        load_scene(scene)
