@@ -11,6 +11,7 @@ from pipeline.files import FileRecord, new_file
 from pipeline.identity import camera
 from pipeline.run_folder import RunFolder
 from pipeline.shards import Shard
+from renderer.integrators.record import WordCollision, WordColumns, distinct_words
 from renderer.scene.arrays import Scene
 from renderer.settings import TraceSettings
 from renderer.tables import EVENTS, TECHNIQUES, WORDS
@@ -101,39 +102,18 @@ def quadrics(scene: Scene) -> pa.Table:
 
 # --- words --------------------------------------------------------------------------------------------------------
 
-_WORD = np.dtype([("word", "<u8"), ("parent", "<u8"), ("event", "u1"), ("object", "<u2")])
-
 
 def merged_words(folder: RunFolder, shards: tuple[Shard, ...]) -> pa.Table:
     """The distinct words of all shards, sorted. Raises RunFolderError where two prefixes share a hash."""
-    merged = np.empty(0, _WORD)
+    schema = WORDS.schema(tuple(WORDS.by_name))
+    merged: WordColumns = [np.empty(0, field.type.to_pandas_dtype()) for field in schema]
     for shard in shards:
         table = pa.ipc.open_file(pa.memory_map(str(folder.table("words", shard)))).read_all()
-        rows = np.empty(table.num_rows, _WORD)
-        for name in _WORD.names or ():
-            rows[name] = table[name].to_numpy()
-        merged = _distinct(np.concatenate([merged, rows]))
-    return _words(merged)
-
-
-def _distinct(rows: Any) -> Any:
-    """Rows of ``_WORD`` sorted by word, each word once."""
-    rows = rows[np.argsort(rows["word"], kind="stable")]
-    again = np.zeros(len(rows), bool)
-    again[1:] = rows["word"][1:] == rows["word"][:-1]
-    for name in ("parent", "event", "object"):
-        clash = np.flatnonzero(again[1:] & (rows[name][1:] != rows[name][:-1]))
-        if len(clash):
-            raise RunFolderError(
-                f"two different prefixes of walks share the word {rows['word'][clash[0]]:#x} (a collision of 64-bit hashes): "
-                "the tables cannot tell them apart. Lower render.max_depth, or name fewer objects"
-            )
-    return rows[~again]
-
-
-def _words(rows: Any) -> pa.Table:
-    schema = WORDS.schema(tuple(_WORD.names or ()))
-    return pa.table({name: pa.array(np.ascontiguousarray(rows[name])) for name in schema.names}, schema=schema)
+        try:
+            merged = distinct_words([np.concatenate([column, table[name].to_numpy()]) for column, name in zip(merged, schema.names, strict=True)])
+        except WordCollision as error:
+            raise RunFolderError(str(error)) from None
+    return pa.table([pa.array(column) for column in merged], schema=schema)
 
 
 # --- the run ------------------------------------------------------------------------------------------------------

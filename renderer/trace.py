@@ -18,7 +18,7 @@ from renderer.film import Film
 from renderer.integrators.buffers import Counters, TileBuffers, grow
 from renderer.integrators.connect import connect, keep_blocked
 from renderer.integrators.estimators import estimator
-from renderer.integrators.record import Recorder, used_words
+from renderer.integrators.record import Recorder, WordColumns, used_words
 from renderer.kernel import kernel
 from renderer.math.hash import GOLDEN, mix64
 from renderer.math.vec import FAR
@@ -94,7 +94,7 @@ class Tracer:
         must be used before ``write`` returns. ``film`` receives every walk, recorded or not. None: not wanted.
         """
         counts = TraceCounts()
-        words: list[tuple[npt.NDArray[np.generic], ...]] = []
+        words: list[WordColumns] = []
         self.buffers.words.seen[:] = 0
         recording = write is not None and self.settings.keep > 0.0
         for ids in tiles(walks, len(self.buffers.lanes.walk)):

@@ -3,6 +3,7 @@
 Rows come bounce by bounce; a counting sort by lane restores walk order, and keeps the order within a walk.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,30 @@ def fill_paths(rows: PathRows, n: int, lanes: Lanes, camera: bool, start: I64, p
         blocker[k] = rows.blocker[i]
 
 
+WordColumns = Sequence[npt.NDArray[Any]]
+"""The columns word, parent, event and object of some words."""
+
+
+class WordCollision(RuntimeError):
+    """Two different prefixes of walks with one 64-bit hash: some 2^-64 for each pair of them."""
+
+
+def distinct_words(columns: WordColumns) -> WordColumns:
+    """Each word once, in order of the word. Raises WordCollision."""
+    order = np.argsort(columns[0], kind="stable")
+    columns = [c[order] for c in columns]
+    again = np.zeros(len(order), bool)
+    again[1:] = columns[0][1:] == columns[0][:-1]
+    for column in columns[1:]:
+        clash = np.flatnonzero(again[1:] & (column[1:] != column[:-1]))
+        if len(clash):
+            raise WordCollision(
+                f"two different prefixes of walks share the word {columns[0][clash[0]]:#x}, so they have the same hash of 64 bits: "
+                "the tables cannot tell them apart. Lower render.max_depth, or name fewer objects"
+            )
+    return [c[~again] for c in columns]
+
+
 class Recorder:
     """Turns one thread's tiles into record batches. Batches alias pooled memory: use them before the next tile."""
 
@@ -138,19 +163,10 @@ class Recorder:
         fill_paths(rows, n, lanes, self.camera, self._start, self._position, columns[f"{side}_walk"], tuple(columns[name] for name in names))
         return self._batch(table.name, columns, total)
 
-    def words(self, rows: list[tuple[npt.NDArray[Any], ...]]) -> pa.RecordBatch:
-        """All distinct words of the given (word, parent, event, object) columns, in order of the word.
-
-        Raises RuntimeError where two prefixes have one hash: some 2^-64 for each pair of them.
-        """
+    def words(self, rows: list[WordColumns]) -> pa.RecordBatch:
+        """All distinct words of the given columns, in order of the word. Raises WordCollision."""
         columns = [np.concatenate(parts) for parts in zip(*rows)] if rows else [np.zeros(0, t) for t in (np.uint64, np.uint64, np.uint8, np.uint16)]
-        order = np.argsort(columns[0], kind="stable")
-        columns = [c[order] for c in columns]
-        repeats = columns[0][1:] == columns[0][:-1]
-        if any((repeats & (c[1:] != c[:-1])).any() for c in columns[1:]):
-            raise RuntimeError("two walk prefixes have the same hash: render again with another seed")
-        first = np.concatenate([[True], ~repeats])[: len(order)]
-        return pa.record_batch([pa.array(c[first]) for c in columns], schema=self.schemas[WORDS.name])
+        return pa.record_batch([pa.array(c) for c in distinct_words(columns)], schema=self.schemas[WORDS.name])
 
     def _order(self, lane: npt.NDArray[np.int32], n: int, n_lanes: int, recorded: npt.NDArray[np.uint8]) -> int:
         if len(self._position) < n:
@@ -197,6 +213,6 @@ def recorded_schemas(settings: TraceSettings) -> dict[str, pa.Schema]:
     return tables
 
 
-def used_words(rows: WordRows, n: int) -> tuple[npt.NDArray[Any], ...]:
+def used_words(rows: WordRows, n: int) -> WordColumns:
     """Copies of the first n words' columns."""
     return rows.word[:n].copy(), rows.parent[:n].copy(), rows.event[:n].copy(), rows.object[:n].copy()
