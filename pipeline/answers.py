@@ -2,44 +2,47 @@
 
 import pathlib
 import sys
+from collections.abc import Sequence
 
 import numpy as np
 
 from pipeline.errors import JobError
 from pipeline.files import clear_errors
 from pipeline.images import F32, write_exr, write_png
-from queries.images import aov_image, image
-from queries.lpe import compile
+from queries.images import select
+from queries.regions import parse_region
 from queries.run import Run, open_run
 from queries.sql import TIME_LIMIT, stream, write
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 
 
-def print_rows(path: pathlib.Path, text: str, format: str, time_limit: float | None = None) -> None:
-    """Run one SQL query, for at most so many seconds, and write its rows to stdout. Raises QueryError."""
-    with open_run(path) as run, stream(run, text, time_limit or TIME_LIMIT) as reader:
+def print_rows(path: pathlib.Path, text: str, format: str, time_limit: float | None = None, define: Sequence[str] = ()) -> None:
+    """Run one SQL query, for at most so many seconds, and write its rows to stdout. Raises QueryError.
+
+    ``define``: further regions, as ``name={sphere: …}``.
+    """
+    with open_run(path, regions=dict(map(parse_region, define))) as run, stream(run, text, time_limit or TIME_LIMIT) as reader:
         write(reader, format, sys.stdout.buffer)
         sys.stdout.buffer.flush()
 
 
-def print_expression(path: pathlib.Path, text: str, out: pathlib.Path | None) -> None:
-    """Say how much light an expression selects, and write its image. Raises QueryError and JobError."""
-    expression = compile(text)
+def print_expression(path: pathlib.Path, text: str, out: pathlib.Path | None, dialect: str = "std", define: Sequence[str] = ()) -> None:
+    """Say how much light an expression selects, and write its image. ``define``: as for ``print_rows``. Raises QueryError and JobError."""
     if out is not None and out.suffix not in (".exr", ".png"):
         raise JobError(f"expected an image file that ends in .exr or .png, found `{out}`")
-    selected, whole = aov_image(path, expression), image(path)  # by path: some shards at a time
-    with open_run(path) as run:
-        rows = run.connection.execute(f"SELECT count(*) FROM ({expression.sql(columns='p.path', light_words=run.light_words)})").fetchone()
-        total = run.connection.execute("SELECT count(*) FROM paths").fetchone()
+    with open_run(path, regions=dict(map(parse_region, define))) as run:
+        expression = run.compile(text, dialect)
+        for warning in expression.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        found = select(run, {"selected": expression, "whole": None})
         if out is not None:
-            _write_image(out, selected, run, text)
-    for warning in expression.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    light, all_light = _mean_luminance(selected), _mean_luminance(whole)
+            _write_image(out, found["selected"].image, run, text)
+    selected, whole = found["selected"], found["whole"]
+    light, all_light = _mean_luminance(selected.image), _mean_luminance(whole.image)
     print(f"{expression}: {expression.describe()}")
-    print(f"paths:     {rows[0] if rows else 0:,} of {total[0] if total else 0:,}")
-    print(f"mean:      {' '.join(f'{value:.6g}' for value in selected.mean(axis=(0, 1), dtype=np.float64))} (linear RGB)")
+    print(f"paths:     {selected.rows:,} of {whole.rows:,}")
+    print(f"mean:      {' '.join(f'{value:.6g}' for value in selected.image.mean(axis=(0, 1), dtype=np.float64))} (linear RGB)")
     print(f"luminance: {light:.6g}, {100 * light / all_light if all_light else 0:.2f} % of the image")
     if out is not None:
         print(f"image:     {out}")

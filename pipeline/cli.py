@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pipeline.errors import BAD_INPUT, FAILED, INTERRUPTED, PipelineError
+from pipeline.errors import BAD_INPUT, FAILED, INTERRUPTED, JobError, PipelineError
 
 app = typer.Typer(name="pathspace", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich")
 
@@ -24,6 +24,30 @@ SetOption = Annotated[
 ]
 
 
+class Dialect(StrEnum):
+    """The notations of light path expressions."""
+
+    std = "std"
+    osl = "osl"
+    thesis = "thesis"
+
+
+class By(StrEnum):
+    """What classes of paths are ranked by."""
+
+    contribution = "contribution"
+    discrimination = "discrimination"
+    ratio = "ratio"
+    literal = "literal"
+
+
+class At(StrEnum):
+    """Which vertex of a path must lie in a region."""
+
+    seen = "seen"
+    any = "any"
+
+
 class Format(StrEnum):
     """How rows are printed."""
 
@@ -31,6 +55,16 @@ class Format(StrEnum):
     csv = "csv"
     json = "json"
     arrow = "arrow"
+
+
+DefineOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--define", metavar="NAME=REGION", help="Define a region, such as 'spot={sphere: {center: [0, 1, 0], radius: 0.2}}'; repeatable."
+    ),
+]
+DialectOption = Annotated[Dialect, typer.Option("--dialect", help="The notation of the expression.")]
+FormatOption = Annotated[Format, typer.Option("--format", help="How rows are printed.")]
 
 
 @app.callback()
@@ -85,17 +119,18 @@ def info(run: RunArgument) -> None:
 @app.command()
 def sql(
     run: RunArgument,
-    query: Annotated[str, typer.Argument(metavar="QUERY", help='SQL, such as "SELECT count(*) FROM paths".')],
-    format: Annotated[Format, typer.Option("--format", help="How rows are printed.")] = Format.table,
+    query: Annotated[str, typer.Argument(metavar="QUERY", help="SQL, such as \"SELECT count(*) FROM lpe('C D S+ L')\".")],
+    format: FormatOption = Format.table,
     time_limit: Annotated[
         int | None, typer.Option("--time-limit", metavar="SECONDS", min=1, max=10**9, help="Stop the query after so long (default: 60).")
     ] = None,
+    define: DefineOption = None,
 ) -> None:
-    """Ask a run a question in SQL (DuckDB, read-only)."""
+    """Ask a run a question in SQL (DuckDB, read-only); lpe('EXPR') is the table of the paths that an expression matches."""
     with _clear_exit():
         from pipeline.answers import print_rows
 
-        print_rows(run, query, format.value, time_limit)
+        print_rows(run, query, format.value, time_limit, define or ())
 
 
 @app.command()
@@ -103,14 +138,65 @@ def lpe(
     run: RunArgument,
     expression: Annotated[str, typer.Argument(metavar="EXPR", help='A light path expression, such as "C D .* L".')],
     out: Annotated[
-        pathlib.Path | None, typer.Option("--out", metavar="IMAGE", help="Write the image of the light that the expression selects (EXR).")
+        pathlib.Path | None, typer.Option("--out", metavar="IMAGE", help="Write the image of the light that the expression selects (.exr or .png).")
     ] = None,
+    dialect: DialectOption = Dialect.std,
+    define: DefineOption = None,
 ) -> None:
     """Select light by a light path expression: its share of the image, and the image itself."""
     with _clear_exit():
         from pipeline.answers import print_expression
 
-        print_expression(run, expression, out)
+        print_expression(run, expression, out, dialect.value, define or ())
+
+
+@app.command()
+def rank(
+    run: RunArgument,
+    region: Annotated[
+        str | None, typer.Option("--region", metavar="NAME", help="A region of the job or of --define (default: the whole image).")
+    ] = None,
+    by: Annotated[By, typer.Option("--by", help="Flux, or how special a class is to the region.")] = By.contribution,
+    with_objects: Annotated[bool, typer.Option("--with-objects", help="Tell classes apart by the objects that paths meet, too.")] = False,
+    merge: Annotated[bool, typer.Option("--merge", help="Merge classes into descriptors: direct, diffuse indirect, caustic, …")] = False,
+    at: Annotated[At, typer.Option("--at", help="The vertex that must lie in the region: the one seen by the camera, or any.")] = At.seen,
+    outer: Annotated[
+        float, typer.Option("--outer", metavar="FACTOR", min=1.01, max=1000, help="Size of the outer region, in sizes of the region.")
+    ] = 1.5,
+    top: Annotated[
+        int | None, typer.Option("--top", metavar="N", min=1, help="How many classes are listed (default: 20 in a table, else all).")
+    ] = None,
+    define: DefineOption = None,
+    format: FormatOption = Format.table,
+) -> None:
+    """Rank the classes of light paths in a region: what light is there, and what is special about it."""
+    with _clear_exit():
+        from pipeline.config import Rank
+        from pipeline.rankings import print_ranking
+
+        asked = Rank(region=region, by=by.value, with_objects=with_objects, merge=merge, at=at.value, outer=outer, top=top)
+        print_ranking(run, asked, define or (), format.value)
+
+
+@app.command()
+def diagnose(
+    run: Annotated[pathlib.Path | None, typer.Argument(metavar="RUN", help="A run folder.")] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]…", help="Which diagnostics (default: all; --list names them).")] = None,
+    list_them: Annotated[bool, typer.Option("--list", help="List the diagnostics.")] = False,
+    top: Annotated[int | None, typer.Option("--top", metavar="N", min=1, help="How many rows of each are shown (default: 10 of several).")] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what the columns mean.")] = False,
+    format: FormatOption = Format.table,
+) -> None:
+    """Look for what is wrong with a run: fireflies and where they come from, noise by class, convergence, what max_depth cuts."""
+    with _clear_exit():
+        from pipeline.diagnose import list_diagnostics, print_diagnostics
+
+        if list_them:
+            list_diagnostics()
+        elif run is None:
+            raise JobError("expected a run folder: pathspace diagnose RUN")
+        else:
+            print_diagnostics(run, names or (), format.value, top, explain)
 
 
 @app.command()

@@ -5,11 +5,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from queries.regions import RegionDescription, RegionName
 from renderer.scene.sensors import LARGEST_FILM
 from renderer.settings import UNBOUNDED_DEPTH
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
+RESERVED_IMAGES = {"beauty": "the whole image", "layers": "the image of all layers"}
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)]
 Pixels = Annotated[int, Field(ge=1, le=LARGEST_FILM)]
 
 
@@ -94,6 +98,25 @@ class Record(Section):
         return {"all": 1.0, "none": 0.0}[self.keep] if isinstance(self.keep, str) else self.keep
 
 
+class Rank(Section):
+    """One ranking of the classes of paths in a region (thesis 9.4.2), written into the run folder as `rankings/<name>.csv` and `.arrow`."""
+
+    region: str | None = Field(default=None, description="A name of `regions`; without one, the whole image is ranked, by contribution alone.")
+    by: Literal["contribution", "discrimination", "ratio", "literal"] = Field(
+        default="contribution",
+        description="`contribution`: by flux. `discrimination`: by how special a class is to the region, that is the lower confidence bound of its "
+        "share inside over its share in the surrounding ring. `ratio`: plain flux inside over flux in the outer region; `literal`: the inverse, "
+        "as the thesis has it.",
+    )
+    with_objects: bool = Field(default=False, description="Tell classes apart by the objects that their paths meet, too.")
+    merge: bool = Field(default=False, description="Merge classes into high-level descriptors: direct, diffuse indirect, caustic, …")
+    at: Literal["seen", "any"] = Field(
+        default="seen", description="Which vertex must lie in the region: the one `seen` by the camera, or `any` interaction of the path."
+    )
+    outer: float = Field(default=1.5, gt=1, le=1000, description="Size of the outer region, in sizes of the region.")
+    top: int | None = Field(default=None, ge=1, description="How many classes are listed. Default: all.")
+
+
 class Images(Section):
     """How the pictures beside the linear images are made."""
 
@@ -108,9 +131,12 @@ class Job(Section):
     parameters: dict[str, str | int | float | bool] = Field(default={}, description="Values of the scene's `$parameters`.")
     render: Render = Field(default=Render(), description="How light is simulated.")
     record: Record = Field(default=Record(), description="What is kept.")
-    aovs: dict[Annotated[str, Field(pattern=NAME_PATTERN, max_length=100)], Annotated[str, Field(min_length=1, max_length=10_000)]] = Field(
+    regions: dict[RegionName, RegionDescription] = Field(default={}, description="Named regions, for expressions (`X@name`) and rankings.")
+    dialect: Literal["std", "osl", "thesis"] = Field(default="std", description="The notation of the expressions in `aovs`.")
+    aovs: dict[Name, Annotated[str, Field(min_length=1, max_length=10_000)]] = Field(
         default={}, description="Images of some of the light: name -> light path expression, computed from the tables after rendering."
     )
+    rank: dict[Name, Rank] = Field(default={}, description="Rankings of the classes of paths in a region: name -> what is ranked, and how.")
     images: Images = Field(default=Images(), description="How pictures are made.")
     out: str | None = Field(default=None, min_length=1, description="The run folder. Default: `runs/<name>` in the folder where the command is run.")
 
@@ -124,6 +150,7 @@ class Job(Section):
     @field_validator("aovs")
     @classmethod
     def _no_beauty(cls, value: dict[str, str]) -> dict[str, str]:
-        if "beauty" in value:
-            raise ValueError("`beauty` is the name of the whole image: choose another name")
+        for name, meaning in RESERVED_IMAGES.items():
+            if name in value:
+                raise ValueError(f"`{name}` is the name of {meaning}: choose another name")
         return value

@@ -15,16 +15,21 @@ F32 = npt.NDArray[np.float32]
 
 def write_exr(path: pathlib.Path, image: F32, metadata: Mapping[str, str]) -> None:
     """Write linear radiance, float32 (height, width, 3), as channels R, G, B; metadata keys get the prefix ``pathspace:``."""
-    height, width, _ = image.shape
-    spec = oiio.ImageSpec(width, height, 3, oiio.FLOAT)
-    spec.channelnames = ("R", "G", "B")
+    write_layers(path, {"": image}, metadata)
+
+
+def write_layers(path: pathlib.Path, layers: Mapping[str, F32], metadata: Mapping[str, str]) -> None:
+    """Write images of one size, float32 (height, width, 3), as layers of one EXR: channels ``name.R``, ``name.G``, ``name.B``; R, G, B for ``""``."""
+    height, width, _ = next(iter(layers.values())).shape
+    spec = oiio.ImageSpec(width, height, 3 * len(layers), oiio.FLOAT)
+    spec.channelnames = tuple(f"{name}.{channel}" if name else channel for name in layers for channel in "RGB")
     spec.attribute("compression", "zip")
     spec.attribute("DateTime", "")  # otherwise the time of day is written, and equal images are unequal files
     spec.attribute("Software", f"pathspace {metadata.get('version', '')}".strip())
     spec.attribute("oiio:ColorSpace", "lin_rec709_scene")
     for key, value in metadata.items():
         spec.attribute(f"pathspace:{key}", value)
-    _write(path, spec, np.ascontiguousarray(image, np.float32))
+    _write(path, spec, np.concatenate([np.asarray(image, np.float32) for image in layers.values()], axis=2))
 
 
 def write_png(path: pathlib.Path, image: F32, exposure: float = 0.0) -> None:

@@ -6,9 +6,20 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from pipeline.config import Images, Job, Record, Render
+from pipeline.config import Images, Job, Rank, Record, Render
+from queries.regions import description as regions
 
 _SECTIONS: dict[str, type[BaseModel]] = {"render": Render, "record": Record, "images": Images}
+_NAMED: dict[str, type[BaseModel]] = {  # sections that a job may have any number of, each with its name
+    "regions.NAME": regions.RegionDescription,
+    "regions.NAME.sphere": regions.SphereDescription,
+    "regions.NAME.box": regions.BoxDescription,
+    "regions.NAME.box.rotate": regions.Rotation,
+    "regions.NAME.object": regions.ObjectDescription,
+    "regions.NAME.mesh": regions.MeshDescription,
+    "regions.NAME.stroke": regions.StrokeDescription,
+    "rank.NAME": Rank,
+}
 _EXAMPLE = """\
 name: cornell
 scene: scenes/cornell.yaml          # or a Mitsuba 3 .xml
@@ -22,7 +33,14 @@ render:
   sampler: sobol                    # or independent
   filter: box
 record: {keep: all}
-aovs: {direct: "C D L", indirect: "C D .+ L"}
+regions:
+  bleeding: {sphere: {center: [520, 0, 200], radius: 60}}  # on the floor, beside the red wall
+aovs:
+  direct: "C D L"
+  indirect: "C D .+ L"
+  bleeding: "C D@bleeding X@object:left_wall .* L"
+rank:
+  bleeding: {region: bleeding, with_objects: true, top: 20}
 """
 
 
@@ -37,11 +55,12 @@ def job_docs() -> str:
         f"```yaml\n{_EXAMPLE}```",
         _table("The job", Job, ""),
     ]
-    parts += [_table(f"`{name}`", section, f"{name}.") for name, section in _SECTIONS.items()]
+    parts += [_table(f"`{name}`", section, f"{name}.") for name, section in (_SECTIONS | _NAMED).items()]
     parts += [
         "## Rules",
         "- Paths are relative to the job's file. `--out DIR` says where one run is written, whatever the job says.\n"
-        "- What makes a run the same run is its scene and its `render` and `record` settings: `--resume` goes on with it, also with other `aovs`.\n"
+        "- What makes a run the same run is its scene and its `render` and `record` settings: `--resume` goes on with it, also with other\n"
+        "  `regions`, `aovs` and `rank`.\n"
         "- PNG images are for looking: linear values are multiplied by 2^exposure, clipped to 0 … 1 and given the sRGB curve. EXR images are linear.",
     ]
     return "\n\n".join(parts) + "\n"
@@ -51,7 +70,7 @@ def _table(title: str, model: type[BaseModel], prefix: str) -> str:
     """One section's keys as a table."""
     described = (model.__doc__ or "").strip()
     lines = [f"## {title}", "", described, "", "| key | values | default | meaning |", "|---|---|---|---|"]
-    definitions = Job.model_json_schema().get("$defs", {})
+    definitions = model.model_json_schema().get("$defs", {})
     for name, schema in model.model_json_schema()["properties"].items():
         field = model.model_fields[name]
         section = name in _SECTIONS and model is Job
@@ -61,6 +80,8 @@ def _table(title: str, model: type[BaseModel], prefix: str) -> str:
             else "see below"
             if section
             else "the scene's"
+            if field.default is None and model is Render
+            else "none"
             if field.default is None
             else f"`{json.dumps(field.default)}`"
         )
@@ -86,7 +107,7 @@ def values_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
             return "a list of " + str(len(schema["prefixItems"])) + f": {values_of(schema['prefixItems'][0], definitions)}"
         return f"a list of {values_of(schema['items'], definitions)}"
     if kind == "object":
-        inner = schema.get("additionalProperties")
+        inner = next(iter(schema.get("patternProperties", {}).values()), schema.get("additionalProperties"))
         return f"name: {values_of(inner, definitions)}" if isinstance(inner, dict) else "a section"
     words = {"integer": "whole number", "number": "number", "string": "text", "boolean": "`true` or `false`"}
     return words[str(kind)] + _bounds(schema)

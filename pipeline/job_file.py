@@ -4,7 +4,7 @@ import difflib
 import pathlib
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
 
@@ -31,12 +31,14 @@ _Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?(\d+
 
 @dataclass(frozen=True)
 class LoadedJob:
-    """A job and where it came from. ``scene_place`` is ``file:line`` of its scene."""
+    """A job and where it came from. Places are ``file:line``, of the scene, and of each AOV, region and ranking by name."""
 
     job: Job
     file: pathlib.Path
     scene_place: str
     aov_places: dict[str, str]
+    region_places: dict[str, str] = field(default_factory=dict)
+    rank_places: dict[str, str] = field(default_factory=dict)
 
     @property
     def folder(self) -> pathlib.Path:
@@ -76,7 +78,8 @@ def load_job(path: pathlib.Path, settings: Sequence[str] = ()) -> LoadedJob:
         job = Job.model_validate(data)
     except ValidationError as error:
         raise _explained(error, data, place) from None
-    loaded = LoadedJob(job, path, place(("scene",)), {name: place(("aovs", name)) for name in job.aovs})
+    aovs, regions, rank = ({name: place((section, name)) for name in getattr(job, section)} for section in ("aovs", "regions", "rank"))
+    loaded = LoadedJob(job, path, place(("scene",)), aovs, regions, rank)
     if isinstance(job.scene, str) and not (path.parent / job.scene).is_file():
         raise JobError(f"there is no scene file `{path.parent / job.scene}`: paths are relative to the job's file", loaded.scene_place)
     return loaded

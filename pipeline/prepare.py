@@ -1,4 +1,4 @@
-"""From a job file to what can be traced: the compiled scene, complete settings, expressions that parse."""
+"""From a job file to what can be traced: the compiled scene, complete settings, questions that can be answered."""
 
 import copy
 import pathlib
@@ -10,6 +10,7 @@ from pipeline.errors import JobError
 from pipeline.identity import fingerprint, trace_settings
 from pipeline.job_file import LoadedJob, load_job
 from pipeline.progress import LOG
+from pipeline.questions import check_questions
 from renderer.errors import SceneError
 from renderer.scene.arrays import Scene
 from renderer.scene.load import load_scene
@@ -29,35 +30,15 @@ class PreparedJob:
 
 
 def prepare_job(path: pathlib.Path, overrides: Sequence[str] = ()) -> PreparedJob:
-    """Read a job, check its expressions and compile its scene. Raises JobError and SceneError."""
+    """Read a job, compile its scene, and check its questions. Raises JobError and SceneError."""
     loaded = load_job(path, overrides)
-    check_expressions(loaded)
+    check_questions(loaded)
     scene = compile_scene(loaded)
+    check_questions(loaded, scene)
     for warning in scene.warnings:
         LOG.warning("warning: %s", warning)
     settings = trace_settings(loaded.job, scene)
     return PreparedJob(loaded, scene, settings, fingerprint(settings, scene))
-
-
-def check_expressions(loaded: LoadedJob) -> None:
-    """Compile every AOV's expression now, not after hours of rendering."""
-    if loaded.job.aovs and loaded.job.record.share == 0.0:
-        place = next(iter(loaded.aov_places.values()))
-        raise JobError(
-            "`aovs` are computed from the tables, and `record.keep: none` keeps none: record all walks or a fraction, or drop `aovs`", place
-        )
-    if not loaded.job.aovs:
-        return
-    from queries.errors import QueryError
-    from queries.lpe import compile
-
-    for name, expression in loaded.job.aovs.items():
-        try:
-            warnings = compile(expression).warnings
-        except QueryError as error:
-            raise JobError(f"`aovs.{name}`: {error}, in `{expression}`", loaded.aov_places[name]) from None
-        for warning in warnings:
-            LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
 
 
 def compile_scene(loaded: LoadedJob) -> Scene:

@@ -3,6 +3,7 @@
 ::
 
     images/<name>.exr, .png       linear image, and a picture of it
+    rankings/<name>.csv, .arrow   classes of paths in a region, ranked
     tables/<table>/<shard>.arrow  recorded tables, a file for each shard
     tables/<catalogue>.arrow      words, objects, events, …
     words/<shard>.arrow           distinct words of each shard
@@ -63,6 +64,10 @@ class RunFolder:
     def image(self, name: str, kind: str) -> pathlib.Path:
         """The file of an image; ``kind`` is ``exr`` or ``png``."""
         return self.path / "images" / f"{name}.{kind}"
+
+    def ranking(self, name: str, kind: str) -> pathlib.Path:
+        """The file of a ranking; ``kind`` is ``csv`` or ``arrow``."""
+        return self.path / "rankings" / f"{name}.{kind}"
 
     # --- creating and locking -------------------------------------------------------------------------------------
 

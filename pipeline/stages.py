@@ -25,8 +25,7 @@ from pipeline.shards import Shard, plan_shards, shard_count, shard_size
 from renderer.film import Film
 from renderer.trace import Tracer
 
-_AOV_WORKERS = 8
-_AOV_MEMORY = 2000 // _AOV_WORKERS  # MB for each worker's queries, beyond which they spill to disk
+LAYERS = "layers"  # the file of all images: no AOV may have its name
 
 
 @dataclass
@@ -254,47 +253,76 @@ class Run:
         self.manifest["stats"] |= {"vertices": rows["vertices"], "paths": rows["paths"], "bytes": size}
 
     def _write_aovs(self) -> None:
-        """Resolve every AOV from the tables; images of expressions that are gone are left alone."""
+        """Resolve every AOV from the tables, in one pass; images of expressions that are gone are left alone."""
         if not self.job.aovs:
             return
-        from queries.images import aov_image
-
-        def resolve(expression: str) -> images.F32:
-            # One thread, of a memory that does not depend on how many there are, adds in the same order each time: the same bits
-            return aov_image(self.folder.path, expression, threads=1, memory_limit=f"{_AOV_MEMORY}MB")
+        from queries.images import images as resolve
+        from queries.run import open_run
 
         wanted = {name: expression for name, expression in self.job.aovs.items() if not self._has_image(name, expression)}
-        with ThreadPoolExecutor(min(self.threads, _AOV_WORKERS)) as pool, progress("AOVs", len(wanted), "images") as bar:
-            for (name, expression), pixels in zip(wanted.items(), pool.map(resolve, wanted.values()), strict=True):
-                self._write_image(name, pixels, expression)
-                bar.advance(1)
+        with progress("AOVs", len(self.job.aovs), "images") as bar:
+            bar.advance(len(self.job.aovs) - len(wanted))
+            if wanted:
+                with open_run(self.folder.path, threads=self.threads) as run:
+                    found = resolve(run, {name: run.compile(expression, self.job.dialect) for name, expression in wanted.items()})
+                for name, pixels in found.items():
+                    self._write_image(name, pixels, wanted[name])
+                    bar.advance(1)
+        if wanted or not self._has_layers():
+            self._write_layers()
+
+    def _has_layers(self) -> bool:
+        """Whether the layered file was written before, of the same images."""
+        known = self.manifest["images"].get(LAYERS, {})
+        try:
+            same = known["expressions"] == self.job.aovs and known["terms"] == self._terms()
+            return bool(same) and checksum(self.folder.image(LAYERS, "exr")) == (known["exr"]["bytes"], known["exr"]["xxh3"])
+        except (KeyError, OSError):
+            return False
+
+    def _write_layers(self) -> None:
+        """Write the image and all AOVs as layers of one EXR, with their expressions, and note its checksum."""
+        names = {"": "beauty"} | {name: name for name in self.job.aovs}
+        layers = {layer: images.read_exr(self.folder.image(name, "exr")) for layer, name in names.items()}
+        images.write_layers(self.folder.image(LAYERS, "exr"), layers, self._metadata(LAYERS) | self.job.aovs)
+        record = FileRecord(0, *checksum(self.folder.image(LAYERS, "exr"))).as_json()
+        self.manifest["images"][LAYERS] = {"expression": None, "expressions": dict(self.job.aovs), "terms": self._terms(), "exr": record}
 
     def _has_image(self, name: str, expression: str) -> bool:
-        """Whether the AOV was computed before, from the same expression."""
+        """Whether the AOV was computed before, from the same expression in the same terms."""
         known = self.manifest["images"].get(name, {})
         try:
-            same = known["exposure"] == self.job.images.exposure and known["expression"] == expression
+            same = known["exposure"] == self.job.images.exposure and known["expression"] == expression and known["terms"] == self._terms()
             return same and checksum(self.folder.image(name, "exr")) == (known["exr"]["bytes"], known["exr"]["xxh3"])
         except (KeyError, OSError):
             return False
 
     def _write_image(self, name: str, image: images.F32, expression: str | None) -> None:
         """Write one image in both kinds, and note its checksums."""
-        settings, job = self.settings, self.job
-        metadata = {
-            "job": job.name,
+        exposure = self.job.images.exposure
+        images.write_exr(self.folder.image(name, "exr"), image, self._metadata(name) | {"expression": expression or ""})
+        images.write_png(self.folder.image(name, "png"), image, exposure)
+        files = {kind: FileRecord(0, *checksum(self.folder.image(name, kind))).as_json() for kind in ("exr", "png")}
+        self.manifest["images"][name] = {"expression": expression, "exposure": exposure, **files}
+        if expression is not None:
+            self.manifest["images"][name]["terms"] = self._terms()
+
+    def _terms(self) -> dict[str, Any]:
+        """What expressions mean in this job: their dialect and its regions."""
+        job = self.job.model_dump(mode="json")
+        return {"dialect": job["dialect"], "regions": job["regions"]}
+
+    def _metadata(self, name: str) -> dict[str, str]:
+        """What an image file says of the run."""
+        return {
+            "job": self.job.name,
             "image": name,
-            "expression": expression or "",
-            "method": settings.method,
-            "seed": str(settings.seed),
-            "samples": str(settings.passes),
-            "max_depth": str(settings.max_depth),
+            "method": self.settings.method,
+            "seed": str(self.settings.seed),
+            "samples": str(self.settings.passes),
+            "max_depth": str(self.settings.max_depth),
             "version": self.manifest["versions"]["pathspace"],
         }
-        images.write_exr(self.folder.image(name, "exr"), image, metadata)
-        images.write_png(self.folder.image(name, "png"), image, job.images.exposure)
-        files = {kind: FileRecord(0, *checksum(self.folder.image(name, kind))).as_json() for kind in ("exr", "png")}
-        self.manifest["images"][name] = {"expression": expression, "exposure": job.images.exposure, **files}
 
     def _save(self) -> None:
         """Write the manifest with what is known by now."""

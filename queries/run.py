@@ -1,18 +1,25 @@
 """Open a run: its tables memory-mapped, and read-only DuckDB views of them."""
 
+import functools
 import json
 import os
 import pathlib
 import shutil
 import tempfile
+from collections.abc import Mapping
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 import pyarrow as pa
 
 from queries.errors import RunError
 from queries.views import CATALOGUES, RECORDED, create_views
+from queries.word_tree import WordTree
+
+if TYPE_CHECKING:
+    from queries.lpe import Expression
+    from queries.regions import Region, SceneGeometry
 
 MEMORY_LIMIT = "2GB"
 _LOCKED = {
@@ -28,17 +35,28 @@ _LOCKED = {
 class Run:
     """An open run: a context manager.
 
-    ``path`` the folder, ``manifest`` its manifest, ``tables`` the stored Arrow tables by name (memory-mapped),
-    ``connection`` a DuckDB connection with the views. ``connect`` makes further connections, of which
-    none sees another's changes; ``disconnect`` ends one.
+    ``path`` the folder, ``manifest`` its manifest, ``tables`` the stored Arrow tables by name (memory-mapped), ``shard_files``
+    the files of the recorded tables, shard by shard, ``regions`` the named regions that expressions may test, ``connection`` a
+    DuckDB connection with the views. ``connect`` makes further connections, of which none sees another's changes; ``disconnect`` ends one.
     """
 
-    def __init__(self, path: pathlib.Path, manifest: dict[str, Any], tables: dict[str, pa.Table], memory_limit: str, threads: int | None) -> None:
+    def __init__(
+        self,
+        path: pathlib.Path,
+        manifest: dict[str, Any],
+        tables: dict[str, pa.Table],
+        shard_files: list[dict[str, pathlib.Path]],
+        memory_limit: str,
+        threads: int | None,
+        regions: "Mapping[str, Region | Mapping[str, Any]] | None" = None,
+    ) -> None:
         self.path = path
+        self.shard_files = shard_files
         self.manifest = manifest
         self.tables = tables
         self.memory_limit = memory_limit
         self.threads = threads
+        self._regions = dict(regions or {})
         self._spill = pathlib.Path(tempfile.mkdtemp(prefix="pathspace-"))
         self._connections: dict[duckdb.DuckDBPyConnection, pathlib.Path] = {}  # open ones, and where they spill
         self._own: duckdb.DuckDBPyConnection | None = None
@@ -53,6 +71,54 @@ class Run:
     def light_words(self) -> bool:
         """Whether paths of this run use light walks."""
         return "paths" in self.tables and "light_word" in self.tables["paths"].schema.names
+
+    @functools.cached_property
+    def words(self) -> WordTree:
+        """The tree of words, ready to be folded over and looked up."""
+        return WordTree(self.tables["words"])
+
+    def files(self, *tables: str) -> list[dict[str, pathlib.Path]]:
+        """The files of these tables, shard by shard: ``queries.shards`` opens no others. A table that the run lacks is left out."""
+        return [{name: file for name, file in shard.items() if name in tables} for shard in self.shard_files]
+
+    @functools.cached_property
+    def regions(self) -> "dict[str, Region]":
+        """The job's regions and those that the run was opened with, which come first. Raises QueryError for a bad description."""
+        from queries.regions import Region, region
+
+        job = self.manifest.get("job") or {}
+        base = pathlib.Path(self.manifest.get("job_file", self.path)).parent
+        named = {name: region(given, base) for name, given in (job.get("regions") or {}).items()}
+        return named | {name: given if isinstance(given, Region) else region(given) for name, given in self._regions.items()}
+
+    @functools.cached_property
+    def geometry(self) -> "SceneGeometry":
+        """The scene's surfaces, as regions need them."""
+        from queries.regions import SceneGeometry
+
+        return SceneGeometry(self)
+
+    def compile(self, text: str, dialect: str = "std") -> "Expression":
+        """A light path expression whose names are those of this run. Raises ``ExpressionError``."""
+        from queries.lpe import compile
+
+        expression = compile(text, dialect, self.names, self.regions)
+        if any(test.field == "medium" for step in expression.alphabet.steps for test in step.tests):
+            expression.warnings = (*expression.warnings, "`@medium:` matches nothing: runs have no media")
+        return expression
+
+    @functools.cached_property
+    def names(self) -> frozenset[str]:
+        """The names of objects, materials and emitters."""
+        objects, emitters = self.tables["objects"], self.tables["emitters"]
+        listed = (*objects["name"].to_pylist(), *objects["material"].to_pylist(), *emitters["name"].to_pylist())
+        return frozenset(name for name in listed if name)
+
+    def sql(self, text: str, time_limit: float | None = 60.0) -> pa.Table:
+        """The answer to a query as an Arrow table (``queries.sql.query``)."""
+        from queries.sql import query
+
+        return query(self, text, time_limit)
 
     @property
     def connection(self) -> duckdb.DuckDBPyConnection:
@@ -98,8 +164,14 @@ class Run:
         self.close()
 
 
-def open_run(path: str | os.PathLike[str], memory_limit: str = MEMORY_LIMIT, threads: int | None = None, shards: range | None = None) -> Run:
-    """Open a finished run, or some of its shards with all of its catalogues.
+def open_run(
+    path: str | os.PathLike[str],
+    memory_limit: str = MEMORY_LIMIT,
+    threads: int | None = None,
+    shards: range | None = None,
+    regions: "Mapping[str, Region | Mapping[str, Any]] | None" = None,
+) -> Run:
+    """Open a finished run, or some of its shards with all of its catalogues. ``regions``: further ones, by name, or as described.
 
     Mapped pages count as the process's memory once they are read: what sums over rows can go through a large run some shards
     at a time. Raises ``RunError`` where the folder is no run, is unfinished, or lacks or holds damaged files.
@@ -107,17 +179,20 @@ def open_run(path: str | os.PathLike[str], memory_limit: str = MEMORY_LIMIT, thr
     folder = pathlib.Path(path)
     manifest = _read_manifest(folder)
     tables: dict[str, pa.Table] = {}
-    for name, files in _table_files(folder, manifest, shards).items():
-        parts = [_map_table(folder / file, file, size) for file, size in files]
+    files = _table_files(folder, manifest, shards)
+    for name, found in files.items():
+        parts = [_map_table(folder / file, file, size) for file, size in found]
         try:
             tables[name] = pa.concat_tables(parts)
         except pa.ArrowInvalid:
             raise RunError(f"the shards of table `{name}` in `{folder}` have different columns: render the run again") from None
     for name, rows in manifest.get("rows", {}).items():
-        found = tables[name].num_rows if name in tables else 0
-        if found != rows and shards is None:
-            raise RunError(f"table `{name}` in `{folder}` has {found:,} rows, its manifest says {rows:,}: {_ADVICE}")
-    return Run(folder, manifest, tables, memory_limit, threads)
+        there = tables[name].num_rows if name in tables else 0
+        if there != rows and shards is None:
+            raise RunError(f"table `{name}` in `{folder}` has {there:,} rows, its manifest says {rows:,}: {_ADVICE}")
+    recorded = [(name, [folder / file for file, _ in found]) for name, found in files.items() if name in RECORDED and name != "words"]
+    shard_files = [dict(zip([name for name, _ in recorded], parts)) for parts in zip(*(parts for _, parts in recorded), strict=True)]
+    return Run(folder, manifest, tables, shard_files, memory_limit, threads, regions)
 
 
 _ADVICE = "run the job again with --resume, which renders damaged shards anew"

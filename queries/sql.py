@@ -13,6 +13,7 @@ import duckdb
 import pyarrow as pa
 
 from queries.errors import QueryError, QueryTimeout
+from queries.lpe_views import make_views
 from queries.run import Run
 
 TIME_LIMIT = 60.0  # seconds
@@ -26,7 +27,9 @@ def stream(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> Iterat
     """The answer to a query as record batches, for answers that need not fit into memory.
 
     Several statements may be given, separated by semicolons; the last one answers. They may make tables and views, which
-    end with the query. Raises ``QueryError`` for bad SQL and for statements that reach outside, ``QueryTimeout`` after ``time_limit`` seconds.
+    end with the query. ``lpe('…')`` is a table of the paths that an expression matches, with the columns of ``paths``;
+    ``lpe_occluded('…')`` one of blocked connections; a second argument names the expression's dialect.
+    Raises ``QueryError`` for bad SQL and for statements that reach outside, ``QueryTimeout`` after ``time_limit`` seconds.
     """
     connection = run.connect()
     timed_out = threading.Event()
@@ -35,15 +38,20 @@ def stream(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> Iterat
         timed_out.set()
         connection.interrupt()
 
+    def check() -> None:
+        if timed_out.is_set():
+            raise QueryTimeout(late)
+
+    late = "" if time_limit is None else f"the query was stopped after {time_limit:g} seconds: ask for less, or raise the time limit (--time-limit)"
     timer = threading.Timer(time_limit, stop) if time_limit is not None else None
     try:
         if timer:
             timer.daemon = True
             timer.start()
-        yield _answer(connection, text)
+        yield _answer(run, connection, text, check)
     except (duckdb.Error, pa.ArrowException, OSError) as error:
         if timed_out.is_set():
-            raise QueryTimeout(f"the query was stopped after {time_limit:g} seconds: ask for less, or raise the time limit (--time-limit)") from None
+            raise QueryTimeout(late) from None
         raise QueryError(str(error)) from None
     finally:
         if timer:
@@ -62,11 +70,11 @@ def batches(connection: duckdb.DuckDBPyConnection, query: str | duckdb.Statement
     return connection.sql(query).to_arrow_reader(rows)
 
 
-def _answer(connection: duckdb.DuckDBPyConnection, text: str) -> pa.RecordBatchReader:
+def _answer(run: Run, connection: duckdb.DuckDBPyConnection, text: str, check: Callable[[], None]) -> pa.RecordBatchReader:
     """Run all statements; the answer to the last."""
     if any(0xD800 <= ord(character) < 0xE000 for character in text):
         raise QueryError("expected SQL as Unicode text, found half of a surrogate pair")
-    statements = connection.extract_statements(text)
+    statements = connection.extract_statements(make_views(run, connection, text, check))
     if not statements:
         raise QueryError("expected an SQL statement, found none")
     for statement in statements:

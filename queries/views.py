@@ -17,13 +17,13 @@ def create_views(connection: duckdb.DuckDBPyConnection, tables: dict[str, pa.Tab
     """Make a view of each recorded table and each catalogue, reading the Arrow tables in place."""
     for name, table in tables.items():
         connection.register(f"stored_{name}", table)
-        connection.execute(f"CREATE TEMP VIEW {name} AS SELECT {_columns(table, RECORDED.get(name))} FROM stored_{name}")
+        connection.execute(f"CREATE TEMP VIEW {name} AS SELECT {select_list(table, RECORDED.get(name))} FROM stored_{name}")
     for name, recorded in RECORDED.items():
         if name not in tables:
-            connection.execute(f"CREATE TEMP VIEW {name} AS SELECT {_columns(None, recorded)} WHERE false")
+            connection.execute(f"CREATE TEMP VIEW {name} AS SELECT {select_list(None, recorded)} WHERE false")
 
 
-def _columns(stored: pa.Table | None, recorded: Table | None) -> str:
+def select_list(stored: pa.Table | None, recorded: Table | None) -> str:
     """The select list: what is stored, widened, in the schema's order, then other stored columns."""
     types = {} if stored is None else {field.name: field.type for field in stored.schema}
     wanted = {column.name: ARROW_TYPES[column.type] for column in recorded.columns} if recorded else {}

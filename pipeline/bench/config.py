@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import yaml
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from pipeline.config import NAME_PATTERN, Section
 from pipeline.errors import JobError
 
-SectionName = Literal["rates", "size", "memory", "error", "start", "features"]
+SectionName = Literal["rates", "size", "memory", "error", "start", "features", "questions"]
 ContenderName = Literal["independent", "sobol", "recorded", "recorded_sobol", "mitsuba_llvm", "mitsuba_scalar"]
 
 
@@ -39,6 +39,33 @@ class Features(Section):
     samples: int = Field(default=32, ge=1, description="Samples for each pixel.")
 
 
+class Question(Section):
+    """One question of a recorded run: an expression whose image is made, or a ranking."""
+
+    what: str = Field(min_length=1, description="What the question shows, for the table.")
+    expression: str | None = Field(default=None, description="A light path expression.")
+    rank: dict[str, Any] | None = Field(default=None, description="A ranking, as in a job's `rank`.")
+    most_seconds: float = Field(gt=0, description="The goal: seconds for the whole answer.")
+
+    @model_validator(mode="after")
+    def _one(self) -> "Question":
+        if (self.expression is None) == (self.rank is None):
+            raise ValueError("expected either `expression` or `rank`")
+        return self
+
+
+class Questions(Section):
+    """Questions of a run of the job that records every path."""
+
+    ask: list[Question] = Field(default=[], description="What is asked.")
+    regex: str | None = Field(
+        default=None,
+        description="The first expression as a regular expression in Python, over words such as `CRDRSL`: the camera, two letters "
+        "for each interaction, the light.",
+    )
+    memory_samples: int = Field(default=0, ge=0, description="Samples for each pixel of a longer run, for the questions' peak memory; 0: none.")
+
+
 class Benchmark(Section):
     """A benchmark file. Paths in it are relative to the file."""
 
@@ -55,6 +82,7 @@ class Benchmark(Section):
     memory: Memory = Field(default=Memory(), description="Peak memory.")
     error: Error = Field(default=Error(), description="Error against time.")
     features: Features = Field(default=Features(), description="The cost of absent features.")
+    questions: Questions = Field(default=Questions(), description="Questions of a recorded run.")
     out: str | None = Field(
         default=None, min_length=1, description="The folder of the results. Default: `runs/bench-<name>` where the command is run."
     )
@@ -74,8 +102,8 @@ class LoadedBenchmark:
 
     @property
     def overrides(self) -> list[str]:
-        """The changes to the job as ``key=value``, AOVs left out: they are questions about a render, not part of it."""
-        return [*(f"{key}={json.dumps(value)}" for key, value in self.benchmark.settings.items()), "aovs={}"]
+        """The changes to the job as ``key=value``, AOVs and rankings left out: they are questions about a render, not part of it."""
+        return [*(f"{key}={json.dumps(value)}" for key, value in self.benchmark.settings.items()), "aovs={}", "rank={}"]
 
     def folder(self, out: pathlib.Path | None) -> pathlib.Path:
         """Where the results go: the argument, else the file's ``out``, else ``runs/bench-<name>`` here."""

@@ -23,6 +23,7 @@ TITLES = {
     "error": "Error against time",
     "start": "Start-up",
     "features": "Absent features",
+    "questions": "Questions",
 }
 
 

@@ -1,7 +1,7 @@
 """The alphabet of an expression: the minterms of its steps, one symbol each.
 
-Events that pass exactly the same steps are the same symbol to every automaton of the expression. The symbols are found
-by trying every combination of event type, scattering type and labels that the expression can tell apart.
+Events that pass exactly the same steps are the same symbol to every automaton of the expression. The symbols are found by refining
+the set of all events field by field: fields are taken as independent, so some symbols may have no event at all.
 """
 
 from collections.abc import Sequence
@@ -10,50 +10,72 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from queries.errors import ExpressionError
-from queries.lpe.limits import MAX_CELLS
-from queries.lpe.syntax import EVENT_TYPES, SCATTERING_TYPES, PathEvent, Step, Test
+from queries.errors import QueryError
+from queries.lpe.minterms import TYPES, Bits, check_size, columns, distinct
+from queries.lpe.syntax import FIELDS, NAMED_FIELDS, PathEvent, Step, Test
 
-CAMERA = PathEvent("C", None)
-_UNNAMED = "\0"  # a letter or label that no expression can name
-_TYPES = EVENT_TYPES + _UNNAMED
-_SCATTERINGS = SCATTERING_TYPES + _UNNAMED
-_MAX_TABLE = 20_000_000  # steps times cells
+CAMERA = PathEvent("C", None, (), frozenset())
 
 
 class Alphabet:
     """Symbols 0 … count - 1.
 
     ``passes``: bool (steps, symbols), whether events of the symbol pass the step; ``types``: bool (symbols, event types), whether it has such events.
+    ``events``: further events that must have symbols, such as one with two objects, which no run has.
     """
 
-    def __init__(self, steps: Sequence[Step]) -> None:
+    def __init__(self, steps: Sequence[Step], events: Sequence[PathEvent] = ()) -> None:
         self.steps = tuple(steps)
-        carried = _label_sets(self.steps)
-        shape = (len(_TYPES), len(_SCATTERINGS), len(carried))
-        cells = int(np.prod(shape))
-        if cells > MAX_CELLS or len(self.steps) * cells > _MAX_TABLE:
-            raise ExpressionError("the expression tells too many kinds of events apart: use fewer different labels and symbols")
-        table = np.zeros((len(self.steps), cells), np.bool_)
-        for i, step in enumerate(self.steps):
-            table[i] = _passes(step, carried).ravel()
-        _, chosen, symbol_of_cell = np.unique(np.packbits(table, axis=0), axis=1, return_index=True, return_inverse=True)
-        self.passes: npt.NDArray[np.bool_] = table[:, chosen]
-        self.types: npt.NDArray[np.bool_] = np.zeros((len(chosen), len(_TYPES)), np.bool_)
-        self.types[symbol_of_cell.ravel(), np.arange(cells) // (cells // len(_TYPES))] = True
-        self._symbols = {column.tobytes(): symbol for symbol, column in enumerate(np.ascontiguousarray(self.passes.T))}
+        used = {test.field for step in self.steps for test in step.tests}
+        passes, types = columns(self.steps, "type"), np.eye(len(TYPES), dtype=np.bool_)
+        passes, types = _merged(passes, types)
+        for field in (field for field in FIELDS if field in used and field != "type"):
+            values = columns(self.steps, field)
+            cells = passes.shape[1] * values.shape[1]
+            check_size(len(self.steps), cells)
+            passes = (passes[:, :, None] & values[:, None, :]).reshape(len(self.steps), cells)
+            passes, types = _merged(passes, np.repeat(types, values.shape[1], axis=0))
+        if events:
+            further = [TYPES.index(event.type if event.type in TYPES else TYPES[-1]) for event in events]
+            passes, types = _merged(np.hstack([passes, self._passed(events)]), np.vstack([types, np.eye(len(TYPES), dtype=np.bool_)[further]]))
+        self.passes: Bits = passes
+        self.types: Bits = types
+        self._symbols = {column: symbol for symbol, column in enumerate(_keys(self.passes))}
 
     def __len__(self) -> int:
         """Number of symbols."""
         return int(self.passes.shape[1])
 
     def symbol(self, event: PathEvent) -> int:
-        """The symbol of an event."""
-        return self._symbols[np.array([step.accepts(event) for step in self.steps], np.bool_).tobytes()]
+        """The symbol of an event. Raises ``QueryError`` for one that has two objects, materials … that the expression tells apart."""
+        return int(self.symbols_of([event])[0])
+
+    def symbols_of(self, events: Sequence[PathEvent]) -> npt.NDArray[np.int32]:
+        """The symbol of each event: int32 (events). See ``symbol``."""
+        passed = self._passed(events)
+        first, kind = distinct(passed)
+        keys = _keys(passed[:, first])
+        try:
+            found = np.array([self._symbols[key] for key in keys], np.int32)
+        except KeyError:
+            odd = next(i for i, key in zip(first, keys) if key not in self._symbols)
+            raise QueryError(f"expected events of one object, material, blocker and technique each, found {events[odd]}") from None
+        return found[kind] if len(events) else np.zeros(0, np.int32)
+
+    def _passed(self, events: Sequence[PathEvent]) -> Bits:
+        """Whether events pass the steps: bool (steps, events)."""
+        answers: dict[Test, Bits] = {}
+        passed = np.ones((len(self.steps), len(events)), np.bool_)
+        for row, step in zip(passed, self.steps):
+            for test in step.tests:
+                if test not in answers:
+                    answers[test] = _answers(test, events)
+                row &= answers[test]
+        return passed
 
     def with_types(self, types: str) -> npt.NDArray[np.int64]:
         """The symbols that some event of one of these types has."""
-        return np.flatnonzero(self.types[:, [_TYPES.index(letter) for letter in types]].any(axis=1))
+        return np.flatnonzero(self.types[:, [TYPES.index(letter) for letter in types]].any(axis=1))
 
     @cached_property
     def signatures(self) -> list[str]:
@@ -61,29 +83,24 @@ class Alphabet:
         return ["".join("01"[int(bit)] for bit in column) for column in self.passes.T]
 
 
-def _label_sets(steps: Sequence[Step]) -> list[tuple[str, ...]]:
-    """The sets of labels that the steps may tell apart. Labels that are always named together count as one."""
-    named = list(dict.fromkeys(test.names for step in steps for test in step.tests if test.field == "label"))
-    if not named:
-        return [()]
-    kinds: dict[tuple[bool, ...], str] = {}
-    for label in sorted({name for names in named for name in names}):
-        kinds.setdefault(tuple(label in names for names in named), label)
-    labels = list(kinds.values())
-    if 2 ** len(labels) > MAX_CELLS:
-        raise ExpressionError(f"{len(labels)} labels that events may carry in any combination make too many kinds of events: use fewer labels")
-    combinations = (tuple(label for i, label in enumerate(labels) if chosen >> i & 1) for chosen in range(1, 2 ** len(labels)))
-    return [(), (_UNNAMED,), *combinations]
+def _merged(passes: Bits, types: Bits) -> tuple[Bits, Bits]:
+    """Equal columns made one, which has the types of all."""
+    first, kind = distinct(passes)
+    merged = np.zeros((len(first), types.shape[1]), np.bool_)
+    cells, letters = np.nonzero(types)
+    merged[kind[cells], letters] = True
+    return passes[:, first], merged
 
 
-def _passes(step: Step, carried: Sequence[tuple[str, ...]]) -> npt.NDArray[np.bool_]:
-    """Whether events pass a step: bool (types, scattering types, label sets)."""
+def _keys(table: Bits) -> list[bytes]:
+    """A key for each column."""
+    return [column.tobytes() for column in np.packbits(table, axis=0).T]
 
-    def column(field: str, events: list[PathEvent]) -> npt.NDArray[np.bool_]:
-        tests: list[Test] = [test for test in step.tests if test.field == field]
-        return np.array([all(test.accepts(event) for test in tests) for event in events])
 
-    types = column("type", [PathEvent(letter, None) for letter in _TYPES])
-    scatterings = column("scattering", [PathEvent("", None if letter == "x" else letter) for letter in _SCATTERINGS])
-    labels = column("label", [PathEvent("", None, given) for given in carried])
-    return types[:, None, None] & scatterings[None, :, None] & labels[None, None, :]
+def _answers(test: Test, events: Sequence[PathEvent]) -> Bits:
+    """Whether each event passes a test: bool (events)."""
+    if test.field in NAMED_FIELDS and all(event.facts is not None for event in events):
+        wanted = {(test.field, name) for name in test.names}
+        carried = np.fromiter((not wanted.isdisjoint(event.facts or ()) for event in events), np.bool_, len(events))
+        return carried if test.mode == "in" else ~carried
+    return np.fromiter((test.accepts(event) for event in events), np.bool_, len(events))

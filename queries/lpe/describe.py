@@ -1,6 +1,7 @@
 """Syntax tree to plain words, for people who do not read the notation."""
 
-from queries.lpe.syntax import Chain, Choice, Node, Repeat, Step, Test
+from queries.lpe.phrases import phrase_of
+from queries.lpe.syntax import NAMED_FIELDS, NUMBERED_FIELDS, Chain, Choice, Node, Repeat, Step, Test
 
 _TYPES = {
     "C": "the camera",
@@ -13,10 +14,43 @@ _TYPES = {
 }
 _SCATTERING = {"D": "diffuse", "G": "glossy", "S": "specular", "s": "straight", "x": "unscattered"}
 _OPERATORS = {"&": "and also", "-": "but not", "^": "or, but not both,"}
+_TECHNIQUES = {
+    "hit": "a walk that hit it",
+    "sample": "an emitter sample",
+    "lens": "a lens sample",
+    "connection": "a connection of two walks",
+    "merge": "a merge of two walks",
+}
+# What stands after `@`, and what must not be: words around the names.
+_FIELDS = {
+    "object": ("on {}", "not on {}"),
+    "material": ("of material {}", "not of material {}"),
+    "light": ("named {}", "not named {}"),
+    "medium": ("in medium {}", "not in medium {}"),
+    "blocker": ("blocked by {}", "not blocked by {}"),
+    "technique": ("found by {}", "not found by {}"),
+    "region": ("in {}", "not in {}"),
+    "crosses": ("reached across {}", "not reached across {}"),
+    "depth": ("at depth {}", "not at depth {}"),
+    "s": ("with s = {} (vertices sampled from the light)", "not with s = {} (vertices sampled from the light)"),
+    "t": ("with t = {} (vertices sampled from the camera)", "not with t = {} (vertices sampled from the camera)"),
+}
+_ORDINALS = ("first", "second", "third")
+
+
+def explain(node: Node) -> str:
+    """The expression in words, a short phrase first where there is one that says exactly the same.
+
+    >>> from queries.lpe.parser import parse
+    >>> explain(parse("C D <TS>+ L").tree)
+    'refractive caustic (the camera, then diffuse scattering, then specular transmission once or more, then a light)'
+    """
+    phrase = phrase_of(node)
+    return f"{phrase} ({describe(node)})" if phrase else describe(node)
 
 
 def describe(node: Node) -> str:
-    """The expression in words.
+    """The expression in words, event by event.
 
     >>> from queries.lpe.parser import parse
     >>> describe(parse("C<RD><TS>{2}L").tree)
@@ -49,27 +83,62 @@ def _times(low: int, high: int | None) -> str:
 
 
 def describe_step(step: Step) -> str:
-    """One event in words."""
+    """One event in words.
+
+    >>> from queries.lpe.syntax import Test
+    >>> describe_step(Step((Test("scattering", frozenset("D")), Test("object", frozenset({"floor"})), Test("region", frozenset({"p"})))))
+    'diffuse scattering on floor in p'
+    """
     types = [test for test in step.tests if test.field == "type"]
     scatterings = [test for test in step.tests if test.field == "scattering"]
-    labels = [test for test in step.tests if test.field == "label"]
+    further = [test for test in step.tests if test.field not in ("type", "scattering")]
     noun = " and ".join(_listed(test, _TYPES) for test in types)
-    adjective = " and ".join(_listed(test, _SCATTERING) for test in scatterings)
+    untyped = any(test.mode == "in" and test.names == {"x"} for test in scatterings)
+    adjective = "" if untyped else " and ".join(_listed(test, _SCATTERING) for test in scatterings)
     words = [word for word in (adjective, noun or ("scattering" if adjective else "any event")) if word]
-    if labels:
-        words.append(" ".join(_label(test) for test in labels))
-    return " ".join(words)
+    words += ["without a scattering type"] * untyped
+    return " ".join(words + [_label(test) if test.field == "label" else _condition(test) for test in further])
 
 
 def _listed(test: Test, words: dict[str, str]) -> str:
+    if test.field == "type" and test.mode == "in" and test.names == frozenset("RTV"):
+        return "any interaction"
     listed = " or ".join(words.get(name, f"no such event ({name})") for name in sorted(test.names))
     return f"anything but {listed}" if test.mode == "other" else listed
 
 
 def _label(test: Test) -> str:
     names = " or ".join(sorted(test.names))
+    place = "" if test.position is None else f" as its {_ordinal(test.position)} label"
     if test.mode == "in":
-        return f"at {names}"
+        return f"at {names}{place}"
     if test.mode == "without":
-        return f"not at {names}"
-    return f"at something named but not {names}" if names else "at something named"
+        return f"not at {names}{place}"
+    return f"at something named but not {names}{place}" if names else f"at something named{place}"
+
+
+def _ordinal(position: int) -> str:
+    return _ORDINALS[position] if position < len(_ORDINALS) else f"{position + 1}th"
+
+
+def _condition(test: Test) -> str:
+    """What stands after an `@`."""
+    assert test.field in NAMED_FIELDS + NUMBERED_FIELDS
+    if test.field == "technique":
+        names = [_TECHNIQUES.get(name, name) for name in sorted(test.names)]
+    elif test.field in NUMBERED_FIELDS:
+        names = [_range(name) for name in sorted(test.names)]
+    else:
+        names = sorted(test.names)
+    holds, lacks = _FIELDS[test.field]
+    return (holds if test.mode == "in" else lacks).format(" or ".join(names))
+
+
+def _range(text: str) -> str:
+    """A range of numbers in words."""
+    low, dots, high = text.partition("..")
+    if not dots or low == high:
+        return low
+    if not low:
+        return f"at most {high}"
+    return f"{low} to {high}" if high else f"{low} or more"

@@ -6,13 +6,14 @@ state, so equal languages over one alphabet have equal minimal arrays.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from queries.lpe.alphabet import Alphabet
 from queries.lpe.limits import Work, check_automaton
 from queries.lpe.nfa import Nfa, bits
+from queries.lpe.syntax import Step
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Backward:
     transitions: npt.NDArray[np.int32]
 
 
-def _explore(start: list[int], symbols: int, move: Callable[[int, int], int]) -> tuple[list[int], list[list[int]]]:
+def explore(start: list[int], symbols: int, move: Callable[[int, int], int]) -> tuple[list[int], list[list[int]]]:
     """All sets of states (as bits) that ``move`` reaches from ``start``, breadth first, and their transitions."""
     numbers = {subset: i for i, subset in enumerate(dict.fromkeys(start))}
     found = list(numbers)
@@ -58,15 +59,50 @@ def _explore(start: list[int], symbols: int, move: Callable[[int, int], int]) ->
     return found, rows
 
 
-def determinize(nfa: Nfa, alphabet: Alphabet, work: Work) -> Dfa:
+class Letters(Protocol):
+    """What words are made of: an ``Alphabet``, or its symbols at classes of depth."""
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps that tell letters apart."""
+        ...
+
+    @property
+    def passes(self) -> npt.NDArray[np.bool_]:
+        """Whether letters pass the steps: bool (steps, letters)."""
+        ...
+
+    def __len__(self) -> int:
+        """Number of letters."""
+        ...
+
+
+def alike(columns: npt.NDArray[np.int32] | npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Symbols whose columns are equal need to be looked at once: the first of each kind, in order, and for each symbol its kind."""
+    _, first, kind = np.unique(columns, axis=1, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return first[order], place[kind.ravel()]
+
+
+def spread(rows: list[list[int]], kind: npt.NDArray[np.intp]) -> npt.NDArray[np.int32]:
+    """Transitions by symbol, of those by kind of symbol."""
+    check_automaton(len(rows), len(kind))
+    return np.array(rows, np.int32)[:, kind]
+
+
+def determinize(nfa: Nfa, alphabet: Letters, work: Work) -> Dfa:
     """The subset construction. A state is the set of positions that may be read next, and one more bit: a word may end here."""
     end = 1 << len(nfa.symbols)
     numbers = {step: i for i, step in enumerate(alphabet.steps)}
-    readers = [0] * len(alphabet)  # the positions that read each symbol
+    used = {step: alphabet.passes[numbers[step]] for step in dict.fromkeys(nfa.symbols)}
+    chosen, kind = alike(np.array(list(used.values()), np.bool_).reshape(len(used), len(alphabet)))
+    readers = [0] * len(chosen)  # the positions that read each kind of symbol
     for position, step in enumerate(nfa.symbols):
-        for symbol in np.flatnonzero(alphabet.passes[numbers[step]]):
+        for symbol in np.flatnonzero(used[step][chosen]):
             readers[symbol] |= 1 << position
-    work.spend(len(nfa.symbols) * len(alphabet))
+    work.spend(len(nfa.symbols) * len(chosen))
     following = [follow | (end if nfa.last >> i & 1 else 0) for i, follow in enumerate(nfa.follow)]
 
     def move(subset: int, symbol: int) -> int:
@@ -77,30 +113,31 @@ def determinize(nfa: Nfa, alphabet: Alphabet, work: Work) -> Dfa:
             after |= following[position]
         return after
 
-    found, rows = _explore([nfa.first | (end if nfa.nullable else 0)], len(alphabet), move)
-    return Dfa(np.array(rows, np.int32), np.array([bool(subset & end) for subset in found]))
+    found, rows = explore([nfa.first | (end if nfa.nullable else 0)], len(chosen), move)
+    return Dfa(spread(rows, kind), np.array([bool(subset & end) for subset in found]))
 
 
 def combine(a: Dfa, b: Dfa, accepts: Callable[[bool, bool], bool], work: Work) -> Dfa:
     """The product automaton, which accepts where ``accepts`` says so of the two."""
-    symbols = a.transitions.shape[1]
-    ways_a, ways_b = a.transitions.tolist(), b.transitions.tolist()
+    chosen, kind = alike(np.vstack([a.transitions, b.transitions]))
+    ways_a, ways_b = a.transitions[:, chosen].tolist(), b.transitions[:, chosen].tolist()
 
     def move(pair: int, symbol: int) -> int:
         work.spend(1)
         i, j = divmod(pair, b.states)
         return int(ways_a[i][symbol] * b.states + ways_b[j][symbol])
 
-    found, rows = _explore([0], symbols, move)
+    found, rows = explore([0], len(chosen), move)
     accepting = [accepts(bool(a.accepting[pair // b.states]), bool(b.accepting[pair % b.states])) for pair in found]
-    return Dfa(np.array(rows, np.int32), np.array(accepting))
+    return Dfa(spread(rows, kind), np.array(accepting))
 
 
 def minimize(dfa: Dfa, work: Work) -> Dfa:
     """The smallest DFA of the same language, by partition refinement that takes the smaller half (hopcroft1971)."""
-    symbols = dfa.transitions.shape[1]
+    chosen, kind = alike(dfa.transitions)
+    ways, symbols = dfa.transitions[:, chosen].tolist(), len(chosen)
     before: list[list[list[int]]] = [[[] for _ in range(dfa.states)] for _ in range(symbols)]
-    for state, row in enumerate(dfa.transitions.tolist()):
+    for state, row in enumerate(ways):
         for symbol, after in enumerate(row):
             before[symbol][after].append(state)
 
@@ -132,12 +169,12 @@ def minimize(dfa: Dfa, work: Work) -> Dfa:
             for other in range(symbols):
                 smaller = fresh if len(part) <= len(blocks[number]) else number
                 pending.add((fresh if (number, other) in pending else smaller, other))
-    return _renumbered(dfa, block_of)
+    members, rows = _renumbered(ways, block_of)
+    return Dfa(spread(rows, kind), dfa.accepting[np.array(members)])
 
 
-def _renumbered(dfa: Dfa, block_of: list[int]) -> Dfa:
-    """The quotient automaton, numbered breadth first from the start state."""
-    ways = dfa.transitions.tolist()
+def _renumbered(ways: list[list[int]], block_of: list[int]) -> tuple[list[int], list[list[int]]]:
+    """The quotient automaton, numbered breadth first from the start state: a member of each new state, and the new transitions."""
     numbers = {block_of[0]: 0}
     members = [0]
     rows: list[list[int]] = []
@@ -149,7 +186,7 @@ def _renumbered(dfa: Dfa, block_of: list[int]) -> Dfa:
                 members.append(after)
             row.append(numbers[block_of[after]])
         rows.append(row)
-    return Dfa(np.array(rows, np.int32), dfa.accepting[np.array(members)])
+    return members, rows
 
 
 def read_backward(dfa: Dfa, work: Work) -> Backward:
@@ -162,7 +199,7 @@ def read_backward(dfa: Dfa, work: Work) -> Backward:
         return _before(sources[symbol], subset)
 
     ends = [_before(sources[symbol], mask(dfa.accepting)) for symbol in range(symbols)]
-    found, rows = _explore(ends, symbols, move)
+    found, rows = explore(ends, symbols, move)
     numbers = {subset: i for i, subset in enumerate(found)}
     return Backward(found, [numbers[end] for end in ends], np.array(rows, np.int32))
 

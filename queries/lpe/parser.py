@@ -6,22 +6,27 @@
     exclusive  := both { "^" both }
     both       := chain { ( "&" | "-" ) chain }
     chain      := item item*
-    item       := atom [ "*" | "+" | "?" | "{n}" | "{n,}" | "{,m}" | "{n,m}" ]
+    item       := atom predicate* [ "*" | "+" | "?" | "{n}" | "{n,}" | "{,m}" | "{n,m}" ]
     atom       := "(" expression ")" | "[" item { ["|"] item } "]" | "[^" symbol+ "]" | "<" group ">"
                 | letter | "." | label | "!" label
     group      := [ field [ field ( field | "!" label )* ] ]     (event type, scattering type, labels)
     field      := symbol | "." | "[" symbol+ "]" | "[^" symbol+ "]"
+    predicate  := "@" …                                          (see ``predicates``)
 
+Before all that may stand value prefixes (see ``prefixes``).
 ``&``, ``-`` and ``^`` combine whole expressions only. ``X`` is any interaction, ``E`` the eye (the camera).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from queries.errors import ExpressionError
 from queries.lpe.limits import MAX_NESTING, MAX_REPEAT
+from queries.lpe.names import Known
+from queries.lpe.predicates import with_predicates
+from queries.lpe.prefixes import read_prefixes
 from queries.lpe.syntax import EVENT_TYPES, SCATTERING_TYPES, Choice, Combination, Node, Repeat, Step, Test, choice, sequence, step
-from queries.lpe.tokens import END, Token, tokenize
+from queries.lpe.tokens import END, Token, check_length, tokenize
 
 _INTERACTIONS = frozenset("RTV")
 _SYMBOL = "a symbol (C R T V L O B, D G S s, X, E, `.`), a quoted label, `(`, `[` or `<`"
@@ -30,19 +35,32 @@ _CHAIN_ENDS = (")", "]", "|", "&", "-", "^", END)
 
 @dataclass(frozen=True)
 class Parsed:
-    """A tree, and what the reader of the text should know about how it was understood."""
+    """A tree, what the reader of the text should know about how it was understood, and the value prefixes before it."""
 
     tree: Node
     warnings: tuple[str, ...]
+    prefixes: tuple[str, ...] = ()
 
 
-def parse(text: str) -> Parsed:
-    """The syntax tree of an expression; raises ``ExpressionError`` with the column and what was expected there."""
-    parser = _Parser(tokenize(text))
+def parse(text: str, objects: Collection[str] | None = None, regions: Collection[str] | None = None) -> Parsed:
+    """The syntax tree of an expression; raises ``ExpressionError`` with the column and what was expected there.
+
+    ``objects``, ``regions``: the names that exist (see ``Known``).
+    """
+    check_length(text)
+    prefixes, start = read_prefixes(text)
+    parser = _Parser(tokenize(text, start), Known(objects, regions))
     tree = parser.expression()
     if parser.token.kind != END:
-        raise ExpressionError(f"expected the end of the expression, found {parser.token}", parser.token.column)
-    return Parsed(tree, tuple(dict.fromkeys(parser.warnings)))
+        raise ExpressionError(f"expected the end of the expression, found {parser.token}{_hint(parser.token)}", parser.token.column)
+    return Parsed(tree, tuple(dict.fromkeys(parser.warnings)), prefixes)
+
+
+def _hint(token: Token) -> str:
+    """What to do about a mark that stands in a wrong place."""
+    if token.kind == "@":
+        return ": predicates come right after a symbol and before its repetition, as in `X@P*` or `.@object:ball`"
+    return ": value prefixes and their `;` come before everything else" if token.kind == ";" else ""
 
 
 def combines(node: Node) -> bool:
@@ -53,8 +71,9 @@ def combines(node: Node) -> bool:
 class _Parser:
     """Recursive descent with one token of lookahead."""
 
-    def __init__(self, tokens: list[Token]) -> None:
+    def __init__(self, tokens: list[Token], known: Known) -> None:
         self.tokens = tokens
+        self.known = known
         self.at = 0
         self.nesting = 0
         self.warnings: list[str] = []
@@ -122,7 +141,7 @@ class _Parser:
     def item(self) -> Node:
         """An atom and how often it comes."""
         start = self.token
-        atom = self.atom()
+        atom = with_predicates(self.atom(), self, self.known)
         times = self.repetition()
         if times is None:
             return atom
@@ -153,7 +172,7 @@ class _Parser:
             return step(self.lacking())
         if self.take("letter"):
             return step(self.bare(token))
-        raise ExpressionError(f"expected {_SYMBOL}, found {token}", token.column)
+        raise ExpressionError(f"expected {_SYMBOL}, found {token}{_hint(token)}", token.column)
 
     def bare(self, token: Token) -> Test:
         """What a letter outside a group tests."""
@@ -226,7 +245,8 @@ class _Parser:
         if self.take("letter", "label"):
             return self.test(field, [token], "in")
         wanted = {"type": "an event type (C R T V L O B)", "scattering": "a scattering type (D G S s x)", "label": "a quoted label"}[field]
-        raise ExpressionError(f"expected {wanted}, `.`, `[` or `>`, found {token}", token.column)
+        fix = ": predicates come after the `>`" if token.kind == "@" else ""
+        raise ExpressionError(f"expected {wanted}, `.`, `[` or `>`, found {token}{fix}", token.column)
 
     def lacking(self) -> Test:
         """The label after ``!``."""

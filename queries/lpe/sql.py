@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from queries.lpe.alphabet import CAMERA, Alphabet
+from queries.lpe.conditions import OF_EMISSION, OF_INTERACTIONS, ROW_COLUMNS, signature
 from queries.lpe.dfa import Backward, Dfa, alive
 from queries.lpe.nfa import bits
-from queries.lpe.syntax import Step, Test
-from renderer.tables import CAMERA_ROOT, LIGHT_ROOT
+from renderer.tables import CAMERA_ROOT, LIGHT_ROOT, OCCLUDED
 
-_COLUMNS = {"type": "type", "scattering": "coalesce(scattering, 'x')"}
+_BLOCKER = "blocker"
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,20 @@ def select(automata: Automata, table: str, columns: str) -> str:
     camera, accepting = _camera_states(automata)
     if not accepting:
         return f"SELECT {columns} FROM {table} AS p WHERE false"
+    columns_of_row = _row_columns(automata.alphabet, table)
     items = [
         ("symbols(signature, symbol)", _values([(f"'{s}'", i) for i, s in enumerate(automata.alphabet.signatures)])),
         ("steps AS MATERIALIZED", _letters(automata.alphabet)),
         ("forward(state, symbol, next)", _rows(_forward_ways(automata))),
         ("camera(word, state)", _fold_camera(camera)),
         ("last(symbol, state)", _values(list(enumerate(automata.backward.after)))),
-        ("emission(emitter, state)", _emission(automata.alphabet)),
+        (f"emission({', '.join(['emitter', *columns_of_row, 'state'])})", _emission(automata.alphabet, table, columns_of_row)),
     ]
     items.append(("matched(state, suffix)", _values(accepting)))
     items.append(("accepted AS MATERIALIZED", "SELECT word, suffix FROM camera JOIN matched USING (state)"))
-    joins, suffix = ["emission AS e ON e.emitter = p.emitter"], "e.state"
+    # Columns that a run does not store are NULL.
+    joins = ["emission AS e ON e.emitter = p.emitter" + "".join(f" AND e.{name} IS NOT DISTINCT FROM p.{name}" for name in columns_of_row)]
+    suffix = "e.state"
     if automata.backward.transitions.size:
         items.append(("backward(state, symbol, next)", _rows(_backward_ways(automata))))
         items.append(("light(start, word, state)", _fold_light()))
@@ -68,49 +71,29 @@ def _rows(rows: list[tuple[object, ...]]) -> str:
 
 def _letters(alphabet: Alphabet) -> str:
     """Every word with the symbol of its last event: found once for each pair of event and object."""
-    labels = "[objects.name, objects.material, events.lobe]"
-    pairs = f"SELECT event, object, type, scattering, {_label_list(alphabet, labels)} FROM (SELECT DISTINCT event, object FROM words) \
-JOIN events ON events.key = event LEFT JOIN objects USING (object)"
-    letters = f"SELECT event, object, {_signature(alphabet)} AS signature FROM ({pairs})"
-    return f"SELECT word, parent, symbol FROM words JOIN ({letters}) USING (event, object) JOIN symbols USING (signature)"
+    signed = f"SELECT pairs.event, pairs.object, {signature(alphabet.steps, OF_INTERACTIONS)} AS signature \
+FROM (SELECT DISTINCT event, object FROM words) AS pairs JOIN events ON events.key = pairs.event LEFT JOIN objects ON objects.object = pairs.object"
+    return f"SELECT word, parent, symbol FROM words JOIN ({signed}) USING (event, object) JOIN symbols USING (signature)"
 
 
-def _emission(alphabet: Alphabet) -> str:
-    """Every emitter with the backward state of its symbol."""
-    labels = "[emitters.name, objects.name, objects.material]"
-    rows = f"SELECT emitter, emitters.symbol AS type, NULL AS scattering, {_label_list(alphabet, labels)} \
-FROM emitters LEFT JOIN objects USING (object)"
-    signed = f"SELECT emitter, {_signature(alphabet)} AS signature FROM ({rows})"
-    return f"SELECT emitter, state FROM ({signed}) JOIN symbols USING (signature) JOIN last USING (symbol)"
+def _row_columns(alphabet: Alphabet, table: str) -> list[str]:
+    """The columns of a path's row, beside its emitter, that the symbol of its last event depends on."""
+    used = {column for step in alphabet.steps for test in step.tests for column in ROW_COLUMNS.get(test.field, ())}
+    return sorted(used if table == OCCLUDED.name else used - {_BLOCKER})
 
 
-def _label_list(alphabet: Alphabet, labels: str) -> str:
-    """The labels of an event, where the expression asks for labels at all."""
-    used = any(test.field == "label" for step in alphabet.steps for test in step.tests)
-    return f"list_filter({labels}, lambda name: name <> '') AS labels" if used else "NULL AS labels"
-
-
-def _signature(alphabet: Alphabet) -> str:
-    return " || ".join(f"CASE WHEN {_condition(step)} THEN '1' ELSE '0' END" for step in alphabet.steps)
-
-
-def _condition(step: Step) -> str:
-    return " AND ".join(_test(test) for test in step.tests) or "true"
-
-
-def _test(test: Test) -> str:
-    names = ", ".join(quote(name) for name in sorted(test.names))
-    if test.field != "label":
-        return f"{_COLUMNS[test.field]} {'IN' if test.mode == 'in' else 'NOT IN'} ({names})"
-    carries = f"list_has_any(labels, [{names}])" if names else "false"
-    if test.mode == "in":
-        return carries
-    return f"NOT {carries}" + (" AND len(labels) > 0" if test.mode == "other" else "")
-
-
-def quote(text: str) -> str:
-    """A string literal."""
-    return "'" + text.replace("'", "''") + "'"
+def _emission(alphabet: Alphabet, table: str, columns: list[str]) -> str:
+    """Every emitter, with each combination of the row's columns that matter, and the backward state of its symbol."""
+    known = {field: value for field, value in OF_EMISSION.items() if field != _BLOCKER or _BLOCKER in columns}
+    ends = "emitters"
+    if columns:
+        ends = f"(SELECT DISTINCT emitter, {', '.join(columns)} FROM {table}) AS p JOIN emitters ON emitters.emitter = p.emitter"
+    keys = "".join(f", p.{column}" for column in columns)
+    listed = "".join(f", {column}" for column in columns)
+    blockers = " LEFT JOIN objects AS blockers ON blockers.object = p.blocker" if _BLOCKER in columns else ""
+    signed = f"SELECT emitters.emitter{keys}, {signature(alphabet.steps, known)} AS signature \
+FROM {ends} LEFT JOIN objects ON objects.object = emitters.object{blockers}"
+    return f"SELECT emitter{listed}, state FROM ({signed}) JOIN symbols USING (signature) JOIN last USING (symbol)"
 
 
 # --- folds --------------------------------------------------------------------------------------------------------

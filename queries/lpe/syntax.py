@@ -14,41 +14,84 @@ SCATTERING_TYPES = "DGSsx"  # diffuse, glossy, singular, straight, none
 EMITTER_TYPES = frozenset("LOB")
 
 
+BARE_FIELDS = ("type", "scattering", "label")
+NAMED_FIELDS = ("object", "material", "light", "medium", "blocker", "technique", "region", "crosses")
+NUMBERED_FIELDS = ("depth", "s", "t")
+PREFIXES = ("unoccluded", "noclamp", "nothruput", "shadows")
+
+
 class PathEvent(NamedTuple):
-    """One event of a path: its type, its scattering type (None where light does not scatter) and its labels."""
+    """One event of a path: its type, its scattering type (None where light does not scatter), its labels, and what else is known of it.
+
+    ``facts``: pairs (field, name), such as ("object", "floor") or ("region", "spot"). None: nothing but the labels is known, and a
+    label stands for an object, a material, a light, a medium or a region of its name. The depth of an event is its place in the path.
+    """
 
     type: str
     scattering: str | None
     labels: tuple[str, ...] = ()
+    facts: frozenset[tuple[str, str]] | None = None
 
 
 @dataclass(frozen=True)
 class Test:
-    """A test of one field of an event against some names.
+    """A test of one field of an event.
 
+    ``field``: ``type``, ``scattering``, ``label``, one of ``NAMED_FIELDS`` (what stands after ``@``) or of ``NUMBERED_FIELDS``.
     ``mode``: ``in``, the field is one of the names (a label: the event carries one of them); ``other``, it is none of them
-    (a label: the event carries some label, and none of these); ``without``, labels only, the event carries none of these.
+    (a label: the event carries some label, and none of these); ``without``, the event carries none of these (labels and ``@`` fields).
+    ``position``: of a label in the event's list, from 0, as OSL counts them (``in``: the label there is one of the names; ``other``: a
+    label is there, and it is none of them); None: anywhere in the list.
+    Names of numbered fields are ranges: ``2``, ``2..4``, ``2..``, ``..4``. ``depth`` counts events from the camera's 0; ``s`` and ``t`` are
+    the numbers of vertices that were sampled from the light and from the camera (veach1997), known of the path's last event.
     """
 
     __test__ = False  # tells pytest that this is no test case
 
-    field: str  # "type", "scattering" or "label"
+    field: str
     names: frozenset[str]
     mode: str = "in"
+    position: int | None = None
 
     def accepts(self, event: PathEvent) -> bool:
-        """Whether the event passes."""
+        """Whether the event passes. Numbered fields are read from ``facts``."""
         if self.field == "type":
             return (event.type in self.names) == (self.mode == "in")
         if self.field == "scattering":
             return ((event.scattering or "x") in self.names) == (self.mode == "in")
+        if self.field in NAMED_FIELDS:
+            return any(_carries(event, self.field, name) for name in self.names) == (self.mode == "in")
+        if self.field in NUMBERED_FIELDS:
+            numbers = [int(value) for field, value in event.facts or () if field == self.field]
+            return any(in_range(number, text) for number in numbers for text in self.names) == (self.mode == "in")
+        if self.position is not None:
+            there = event.labels[self.position : self.position + 1]
+            return bool(there) and (there[0] in self.names) == (self.mode == "in")
         if self.mode == "in":
             return not self.names.isdisjoint(event.labels)
         return self.names.isdisjoint(event.labels) and (self.mode == "without" or len(event.labels) > 0)
 
-    def order(self) -> tuple[str, str, tuple[str, ...]]:
-        """A sorting key."""
-        return self.field, self.mode, tuple(sorted(self.names))
+    def order(self) -> tuple[int, int, str, tuple[str, ...]]:
+        """A sorting key: fields in the order that groups spell them."""
+        return FIELDS.index(self.field), -1 if self.position is None else self.position, self.mode, tuple(sorted(self.names))
+
+
+FIELDS = (*BARE_FIELDS, *NAMED_FIELDS, *NUMBERED_FIELDS)
+
+
+def _carries(event: PathEvent, field: str, name: str) -> bool:
+    """Whether a named field of the event has this value."""
+    return name in event.labels if event.facts is None else (field, name) in event.facts
+
+
+def in_range(number: int, text: str) -> bool:
+    """Whether a number lies in a range as expressions write it.
+
+    >>> [in_range(3, text) for text in ("3", "1..2", "2..", "..3")]
+    [True, False, True, True]
+    """
+    low, dots, high = text.partition("..")
+    return number == int(low) if not dots else (not low or number >= int(low)) and (not high or number <= int(high))
 
 
 @dataclass(frozen=True)
@@ -111,14 +154,15 @@ def sequence(parts: Sequence[Node]) -> Node:
 
 def choice(parts: Iterable[Node]) -> Node:
     """Any one of the parts, in normal form. ``parts`` is not empty."""
-    merged: dict[Node | str, Node] = {}
+    merged: dict[Node | tuple[str, int | None], Node] = {}
     for part in _alternatives(parts):
-        # Alternatives such as D|G, that only list the values of one field, become one step [DG].
-        if isinstance(part, Step) and len(part.tests) == 1 and part.tests[0].mode == "in":
+        # Alternatives such as D|G, that only list the values of one field, become one step [DG]; fields after `@` have no such form.
+        if isinstance(part, Step) and len(part.tests) == 1 and part.tests[0].mode == "in" and part.tests[0].field in BARE_FIELDS:
             test = part.tests[0]
-            known = merged.get(test.field)
+            place = (test.field, test.position)
+            known = merged.get(place)
             names = known.tests[0].names | test.names if isinstance(known, Step) else test.names
-            merged[test.field] = Step((Test(test.field, names),))
+            merged[place] = Step((Test(test.field, names, "in", test.position),))
         else:
             merged.setdefault(part, part)
     flat = tuple(merged.values())

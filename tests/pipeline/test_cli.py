@@ -50,7 +50,7 @@ def test_manifest_says_what_was_done(tiny_run: pathlib.Path) -> None:
     assert manifest["rows"]["occluded"] == rows["occluded"] > 0
     assert stats["peak_rss_bytes"] > 50e6
     assert {"scene", "kernels", "estimate", "render", "images", "catalogues", "aovs"} <= set(stats["stages"])
-    assert set(manifest["images"]) == {"beauty", "direct"}
+    assert set(manifest["images"]) == {"beauty", "direct", "layers"}
     assert manifest["settings"]["passes"] == 64
 
 
@@ -132,15 +132,16 @@ def test_time_limit_of_a_query(tiny_run: pathlib.Path) -> None:
     assert pathspace("sql", tiny_run, "SELECT 1", "--time-limit", "100").exit_code == 0
 
 
-def test_expression_opens_a_large_run_some_shards_at_a_time(tiny_run: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_images_that_do_not_fit_take_several_passes(tiny_run: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = pathspace("lpe", tiny_run, "C D L")
-    opened: list[object] = []
-    real = queries.images.open_run
-    monkeypatch.setattr(queries.images, "_MAPPED_ROWS", 10_000)
-    monkeypatch.setattr(queries.images, "open_run", lambda *arguments: (opened.append(arguments[3:]), real(*arguments))[1])
-    parts = pathspace("lpe", tiny_run, "C D L")
-    assert parts.stdout == whole.stdout
-    assert len([shards for shards in opened if shards]) > 8
+    passes: list[int] = []
+    real = queries.images.map_shards
+    monkeypatch.setattr(queries.images, "map_shards", lambda files, *arguments: (passes.append(len(files)), real(files, *arguments))[1])
+    assert pathspace("lpe", tiny_run, "C D L").stdout == whole.stdout
+    assert passes == [16]
+    monkeypatch.setattr(queries.images, "_MEMORY", 1)
+    assert pathspace("lpe", tiny_run, "C D L").stdout == whole.stdout
+    assert passes == [16, 16, 16]
 
 
 def test_faults_exit_with_1(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:

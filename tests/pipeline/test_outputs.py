@@ -10,16 +10,17 @@ import pyarrow as pa
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tiny_job import SHARDS, write_job
+from tiny_job import SCENE, SHARDS, write_job
 
 from pipeline.catalogues import merged_words
 from pipeline.errors import RunFolderError
 from pipeline.film_sum import lit_rows
-from pipeline.images import read_exr, tone_map, write_exr, write_png
+from pipeline.images import read_exr, tone_map, write_exr, write_layers, write_png
 from pipeline.prepare import prepare_job
 from pipeline.run_folder import RunFolder
 from pipeline.shards import LARGEST, SMALLEST, plan_shards
 from pipeline.stages import run_job
+from queries import open_run
 from renderer.film import Film
 from renderer.tables import CAMERA_ROOT, EVENTS, TECHNIQUES, WORDS
 from renderer.trace import Tracer
@@ -168,6 +169,120 @@ def test_exr_is_linear_with_names_and_metadata(tmp_path: pathlib.Path) -> None:
     assert spec.get_string_attribute("pathspace:job") == "tiny"
     assert spec.get_string_attribute("pathspace:seed") == str(2**60)
     assert spec.get_string_attribute("Software") == "pathspace 0.1.0"
+
+
+def test_layers_of_one_exr(tmp_path: pathlib.Path) -> None:
+    random = np.random.default_rng(3)
+    layers = {name: random.random((5, 7, 3), np.float32) for name in ("", "direct", "b.c")}
+    for name in ("a", "b"):
+        write_layers(tmp_path / f"{name}.exr", layers, {"direct": "C D L"})
+    assert (tmp_path / "a.exr").read_bytes() == (tmp_path / "b.exr").read_bytes()
+    source = oiio.ImageInput.open(str(tmp_path / "a.exr"))
+    spec, pixels = source.spec(), source.read_image(oiio.FLOAT)
+    for name, image in layers.items():
+        channels = [spec.channelnames.index(f"{name}.{channel}" if name else channel) for channel in "RGB"]
+        assert np.array_equal(pixels[..., channels], image)
+    assert spec.get_string_attribute("pathspace:direct") == "C D L"
+    assert np.array_equal(read_exr(tmp_path / "a.exr"), layers[""])
+
+
+# --- AOVs ---------------------------------------------------------------------------------------------------------
+
+AOVS = {
+    "seen": "C L",
+    "direct": "C D L",
+    "rest": "C .* L - C D? L",
+    "shadow": "shadows; C D .@blocker:block",
+    "near": "C X@middle .* L",
+    "open": "unoccluded; C D L",
+}
+MIDDLE = {"middle": {"sphere": {"center": [0, 0.5, 0], "radius": 1.2}}}
+
+
+@pytest.fixture(scope="module")
+def aov_run(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    folder = tmp_path_factory.mktemp("aovs")
+    return run_job(write_job(folder, aovs=AOVS, regions=MIDDLE), out=folder / "run", threads=2).path
+
+
+def test_aovs_as_layers(aov_run: pathlib.Path) -> None:
+    source = oiio.ImageInput.open(str(aov_run / "images/layers.exr"))
+    spec, pixels = source.spec(), source.read_image(oiio.FLOAT)
+    assert len(spec.channelnames) == 3 * (1 + len(AOVS))
+    for name, text in AOVS.items():
+        layer = pixels[..., [spec.channelnames.index(f"{name}.{channel}") for channel in "RGB"]]
+        assert layer.max() > 0
+        assert np.array_equal(layer, read_exr(aov_run / f"images/{name}.exr"))
+        assert spec.get_string_attribute(f"pathspace:{name}") == text
+    beauty = read_exr(aov_run / "images/layers.exr")
+    assert np.array_equal(beauty, read_exr(aov_run / "images/beauty.exr"))
+    parts = [read_exr(aov_run / f"images/{name}.exr").astype(np.float64) for name in ("seen", "direct", "rest")]
+    np.testing.assert_allclose(sum(parts), beauty, rtol=1e-5, atol=1e-6)
+
+
+def test_layers_have_the_same_bits_again(aov_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    """On another number of threads, and made anew after some files were lost."""
+    again = run_job(write_job(tmp_path, aovs=AOVS, regions=MIDDLE), out=tmp_path / "run", threads=1).path
+    names = [*AOVS, "layers"]
+    assert all((again / f"images/{name}.exr").read_bytes() == (aov_run / f"images/{name}.exr").read_bytes() for name in names)
+    kept = (again / "images/seen.exr").stat().st_mtime_ns
+    for name in ("layers", "direct"):
+        (again / f"images/{name}.exr").unlink()
+    run_job(tmp_path / "tiny.yaml", out=again, resume=True, threads=2)
+    assert all((again / f"images/{name}.exr").read_bytes() == (aov_run / f"images/{name}.exr").read_bytes() for name in names)
+    assert (again / "images/seen.exr").stat().st_mtime_ns == kept
+
+
+def test_aovs_follow_the_regions_of_the_job(aov_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    near = {"near": AOVS["near"]}
+    run = run_job(write_job(tmp_path, aovs=near, regions=MIDDLE), out=tmp_path / "run").path
+    before = read_exr(run / "images/near.exr")
+    smaller = {"middle": {"sphere": {"center": [0, 0.5, 0], "radius": 0.6}}}
+    run_job(write_job(tmp_path, aovs=near, regions=smaller), out=run, resume=True)
+    after = read_exr(run / "images/near.exr")
+    assert 0 < after.sum() < before.sum()
+
+
+def test_unoccluded_light_is_that_of_the_scene_without_the_blocker(tmp_path: pathlib.Path) -> None:
+    """Two runs of different seeds: blocks of pixels agree within their own noise, and where the shadow falls the block's light does not."""
+    floor = {"floor": "C <R.>@object:floor L", "open": "unoccluded; C <R.>@object:floor L", "shadow": "shadows; C <R.>@object:floor .@blocker:block"}
+    thrown = write_job(tmp_path, name="with", aovs=floor, render={"samples": 128, "filter": "box", "resolution": [32, 32], "max_depth": 3})
+    with_block = run_job(thrown, out=tmp_path / "with").path
+    scene = {key: value for key, value in SCENE.items() if key != "block"}
+    clear = write_job(tmp_path, name="without", scene=scene, aovs={"floor": floor["floor"]},
+                      render={"samples": 128, "filter": "box", "resolution": [32, 32], "max_depth": 3, "seed": 11})  # fmt: skip
+    without = run_job(clear, out=tmp_path / "without").path
+    seen = visible_floor(with_block)
+    found, expected = (read_exr(run / f"images/{name}.exr").astype(np.float64)[..., 0] for run, name in ((with_block, "open"), (without, "floor")))
+    direct, shadow = (read_exr(with_block / f"images/{name}.exr").astype(np.float64)[..., 0] for name in ("floor", "shadow"))
+    z = {name: z_scores(image, expected, seen) for name, image in (("open", found), ("with shadow", direct), ("filled", direct + shadow))}
+    assert len(z["open"]) >= 10
+    together = {name: scores.sum() / np.sqrt(len(scores)) for name, scores in z.items()}
+    assert max(np.abs(z["open"]).max(), np.abs(z["filled"]).max()) < 4.5
+    assert max(abs(together["open"]), abs(together["filled"])) < 3.5
+    assert together["with shadow"] < -6  # what the block keeps away can be seen at all
+
+
+def visible_floor(run: pathlib.Path) -> np.ndarray:
+    """Whether all camera walks of a pixel meet the floor first: bool (height, width)."""
+    with open_run(run) as opened:
+        text = """SELECT (walk % 1024)::INT AS pixel, bool_and(object = 0) AS all_floor FROM camera_vertices WHERE depth = 1 GROUP BY 1 ORDER BY 1"""
+        found = opened.connection.execute(text).fetchnumpy()
+    seen = np.zeros(1024, np.bool_)
+    seen[found["pixel"]] = found["all_floor"].astype(np.bool_)
+    return seen.reshape(32, 32)
+
+
+def z_scores(a: np.ndarray, b: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """How far apart two noisy images are in blocks of 4 x 4 pixels, in standard errors of the difference, estimated from the block's pixels."""
+    scores = []
+    for y in range(0, 32, 4):
+        for x in range(0, 32, 4):
+            block = np.s_[y : y + 4, x : x + 4]
+            if seen[block].all():
+                difference = (a - b)[block]
+                scores.append(difference.mean() / (difference.std(ddof=1) / np.sqrt(difference.size)))
+    return np.array(scores)
 
 
 def test_tone_map_is_the_srgb_curve() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from words import matches
+from words import dated, matches
 
 from queries.lpe.syntax import Node, PathEvent
 from renderer.filters import reconstruction_filter
@@ -16,12 +16,15 @@ from renderer.tables import (
     CAMERA_ROOT,
     CAMERA_VERTICES,
     CONNECTION,
+    EMITTER,
+    EMITTER_HIT,
     EMITTER_SAMPLE,
     EVENTS,
     FIRST_SCATTERING,
     LENS_SAMPLE,
     LIGHT_ROOT,
     LIGHT_VERTICES,
+    NO_OBJECT,
     OCCLUDED,
     PATHS,
     TECHNIQUES,
@@ -31,7 +34,10 @@ from renderer.tables import (
 
 OBJECTS = [("floor", "white"), ("wall", "white"), ("glass_ball", "glass"), ("lamp", "black"), ("o'brien", "a\\b")]
 EMITTERS = [("lamp_light", 3, "L"), ("sky", None, "B"), ("glow", 1, "O"), ("spot", None, "L"), ("", None, "L")]  # the last has no name: no label
+NAMES = {EMITTER_HIT: "hit", EMITTER_SAMPLE: "sample", LENS_SAMPLE: "lens", CONNECTION: "connection"}  # of techniques in expressions
 SCATTERING = [event for event in EVENTS if event.key >= FIRST_SCATTERING]
+CAMERA = PathEvent("C", None, (), frozenset())
+_PLACE = ("x", "y", "z", "throughput_r", "throughput_g", "throughput_b")
 Letter = tuple[int, int]  # key of the event, object
 Tables = dict[str, list[dict[str, Any]]]  # rows by table
 
@@ -49,7 +55,7 @@ class SyntheticRun:
 
     def matched(self, tree: Node, backward: bool = False) -> list[int]:
         """The rows of paths whose words match, by trying every path; ``backward`` reads them from the light."""
-        return [i for i, word in enumerate(self.words) if matches(tree, word[::-1] if backward else word)]
+        return [i for i, word in enumerate(self.words) if matches(tree, dated(word)[::-1] if backward else word)]
 
     def image(self, rows: list[int], settings: dict[str, Any]) -> np.ndarray:
         """The image of some rows, pixel by pixel."""
@@ -72,14 +78,25 @@ class SyntheticRun:
 def event_of(letter: Letter) -> PathEvent:
     """What an expression sees of one interaction."""
     event, (name, material) = next(e for e in EVENTS if e.key == letter[0]), OBJECTS[letter[1]]
-    return PathEvent(event.type, event.scattering, (name, material, event.lobe))
+    return PathEvent(event.type, event.scattering, (name, material, event.lobe), frozenset({("object", name), ("material", material)}))
 
 
-def emitter_of(number: int) -> PathEvent:
-    """What an expression sees of an emitter."""
-    name, thing, symbol = EMITTERS[number]
-    labels = (name, *(OBJECTS[thing] if thing is not None else ()))
-    return PathEvent(symbol, None, tuple(label for label in labels if label))
+def emitter_of(row: dict[str, Any], blocked: bool = False) -> PathEvent:
+    """What an expression sees of the emitter at the end of a path."""
+    name, thing, symbol = EMITTERS[row["emitter"]]
+    technique = row["technique"]
+    s = {EMITTER_HIT: 0, EMITTER_SAMPLE: 1}.get(technique, row["light_depth"] + 1)
+    t = 1 if technique == LENS_SAMPLE else row["camera_depth"] + 1
+    facts = {("technique", NAMES[technique]), ("s", str(s)), ("t", str(t))}
+    labels = [name]
+    if thing is not None:
+        labels += OBJECTS[thing]
+        facts |= {("object", OBJECTS[thing][0]), ("material", OBJECTS[thing][1]), ("light", OBJECTS[thing][0])}
+    if name:
+        facts.add(("light", name))
+    if blocked and row["blocker"] != NO_OBJECT:
+        facts.add(("blocker", OBJECTS[row["blocker"]][0]))
+    return PathEvent(symbol, None, tuple(label for label in labels if label), frozenset(facts))
 
 
 class WordTree:
@@ -156,25 +173,32 @@ def _add_walk(
     letters = _letters(generator, generator.choice([0, 1, 1, 2, 2, 3, 4]))
     vertices = "light_vertices" if method == "light" else "camera_vertices"
     for depth, (event, thing) in enumerate(letters, start=1):
-        place = dict.fromkeys(("x", "y", "z", "throughput_r", "throughput_g", "throughput_b"), float(depth))
+        place = dict.fromkeys(_PLACE, float(depth))
         tables.setdefault(vertices, []).append({"walk": walk, "depth": depth, "event": event, "object": thing, **place})
     for path in range(generator.randrange(len(letters) + 2)):
-        # Each path ends with a lobe of its own, as a connection does.
         prefix = letters[:path]
-        if prefix and generator.random() < 0.5:
-            prefix = [*prefix[:-1], (generator.choice(SCATTERING).key, prefix[-1][1])]
         other = _letters(generator, generator.randrange(3)) if method == "both" else []
         emitter = generator.randrange(len(EMITTERS))
+        technique = _technique(generator, method, prefix, other)
+        hit = technique == EMITTER_HIT
+        if prefix and not hit and generator.random() < 0.5:
+            # The path ends with a lobe of its own, as a connection does.
+            prefix = [*prefix[:-1], (generator.choice(SCATTERING).key, prefix[-1][1])]
         camera, light = ([], prefix) if method == "light" else (prefix, other)
+        if hit and path == len(letters):
+            # The walk ends at the emitter.
+            thing = EMITTERS[emitter][1]
+            there = {"event": EMITTER, "object": NO_OBJECT if thing is None else thing} | dict.fromkeys(_PLACE, float(path + 1))
+            tables.setdefault(vertices, []).append({"walk": walk, "depth": path + 1, **there})
         row = {
             "camera_walk": walk,
             "light_walk": walk,
             "path": path,
-            "technique": {"path": EMITTER_SAMPLE, "light": LENS_SAMPLE, "both": CONNECTION}[method],
-            "camera_depth": len(camera),
+            "technique": technique,
+            "camera_depth": len(camera) + hit,
             "light_depth": len(light),
-            "camera_event": camera[-1][0] if camera else 5,
-            "light_event": light[-1][0] if light else 5,
+            "camera_event": camera[-1][0] if camera and not hit else EMITTER,
+            "light_event": light[-1][0] if light else EMITTER,
             "camera_word": tree.add(CAMERA_ROOT, camera),
             "light_word": tree.add(LIGHT_ROOT, light),
             "emitter": emitter,
@@ -185,13 +209,20 @@ def _add_walk(
             "raster_y": raster[1],
             **{f"contribution_{c}": np.float32(generator.expovariate(1)).item() for c in "rgb"},
             "mis_weight": 0.5,
-            "blocker": generator.randrange(len(OBJECTS)),
+            "blocker": generator.choice([NO_OBJECT, *range(len(OBJECTS))]),
         }
-        word = (PathEvent("C", None), *map(event_of, camera), *map(event_of, reversed(light)), emitter_of(emitter))
-        blocked = known["occluded"] and generator.random() < 0.4
+        blocked = known["occluded"] and not hit and generator.random() < 0.4
+        word = (CAMERA, *map(event_of, camera), *map(event_of, reversed(light)), emitter_of(row, blocked))
         (run.occluded if blocked else run.rows).append(row)
         (run.occluded_words if blocked else run.words).append(word)
         tables.setdefault("occluded" if blocked else "paths", []).append(row)
+
+
+def _technique(generator: random.Random, method: str, prefix: list[Letter], other: list[Letter]) -> int:
+    """A technique that can make a path of such walks."""
+    if method == "light" or (method == "both" and not prefix and generator.random() < 0.5):
+        return LENS_SAMPLE
+    return CONNECTION if other else generator.choice([EMITTER_HIT, EMITTER_SAMPLE])
 
 
 def _expose(film: np.ndarray, raster: list[float], known: dict[str, Any]) -> None:

@@ -191,7 +191,7 @@ def test_no_warning_without_cause(text: str) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("CDL", "the camera, then diffuse scattering, then a light"),
+        ("CDL", "direct light (the camera, then diffuse scattering, then a light)"),
         ("C<TS>{2}L", "the camera, then specular transmission 2 times, then a light"),
         ("C<RD'floor'>+B", "the camera, then diffuse reflection at floor once or more, then the background"),
         ("CDL - C!'a'L", "(the camera, then diffuse scattering, then a light) but not (the camera, then any event not at a, then a light)"),
@@ -202,7 +202,7 @@ def test_descriptions(text: str, words: str) -> None:
 
 
 def test_unknown_dialect() -> None:
-    with pytest.raises(ExpressionError, match="expected one of the dialects std"):
+    with pytest.raises(ExpressionError, match="expected one of the dialects std, osl, thesis"):
         compile("CDL", dialect="vray")
 
 

@@ -1,19 +1,34 @@
 """Words of paths as short text, and the plainest matcher of expressions: the oracle of the tests."""
 
-from queries.lpe.syntax import Chain, Choice, Combination, Node, PathEvent, Repeat, Step
+from queries.lpe.syntax import NAMED_FIELDS, Chain, Choice, Combination, Node, PathEvent, Repeat, Step
 
 
 def word(text: str) -> tuple[PathEvent, ...]:
-    """``C RD:floor:paint L`` as events: type, scattering type, labels."""
+    """``C RD:floor:paint@object:floor@P L`` as events: type, scattering type, labels, and facts (``@P``: region P; ``@`` alone: no fact holds)."""
     events = []
     for token in text.split():
-        letters, *labels = token.split(":")
-        events.append(PathEvent(letters[0], letters[1:] or None, tuple(labels)))
+        described, *known = token.split("@")
+        letters, *labels = described.split(":")
+        pairs = (fact.split(":") if ":" in fact else ["region", fact] for fact in known if fact)
+        facts = frozenset((field, name) for field, name in pairs) if known else None
+        events.append(PathEvent(letters[0], letters[1:] or None, tuple(labels), facts))
     return tuple(events)
+
+
+def dated(events: tuple[PathEvent, ...]) -> tuple[PathEvent, ...]:
+    """The events with everything written out as facts: depths, and what labels stand for where nothing else is known."""
+    found = []
+    for depth, event in enumerate(events):
+        facts = event.facts if event.facts is not None else frozenset((field, label) for field in NAMED_FIELDS for label in event.labels)
+        if not any(field == "depth" for field, _ in facts):
+            facts |= {("depth", str(depth))}
+        found.append(event._replace(facts=facts))
+    return tuple(found)
 
 
 def matches(tree: Node, events: tuple[PathEvent, ...]) -> bool:
     """Whether the whole word matches, by trying everything."""
+    events = dated(events)
     if isinstance(tree, Combination):
         result = matches(tree.first, events)
         for operator, operand in tree.rest:

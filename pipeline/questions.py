@@ -1,0 +1,85 @@
+"""What a job will ask of its run, checked before hours of rendering: regions, expressions, rankings."""
+
+from collections.abc import Collection
+
+from pipeline.config import Rank
+from pipeline.errors import JobError
+from pipeline.job_file import LoadedJob
+from pipeline.progress import LOG
+from renderer.scene.arrays import Scene
+
+
+def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
+    """Check that all regions, expressions and rankings can be answered; with a scene, that what they name exists there.
+
+    Raises JobError with the place in the file. Warnings are given with the scene, once.
+    """
+    job = loaded.job
+    for section, place in (("aovs", loaded.aov_places), ("rank", loaded.rank_places)):
+        if place and job.record.share == 0.0:
+            raise JobError(
+                f"`{section}` is computed from the tables, and `record.keep: none` keeps none: record all walks or a fraction, or drop `{section}`",
+                next(iter(place.values())),
+            )
+    _check_regions(loaded, scene)
+    _check_expressions(loaded, scene)
+    for name, asked in job.rank.items():
+        problem = _problem(asked, job.regions)
+        if problem:
+            raise JobError(f"`rank.{name}`: {problem}", loaded.rank_places[name])
+
+
+def _problem(asked: Rank, regions: Collection[str]) -> str | None:
+    """Why a ranking cannot be made."""
+    if asked.region is not None and asked.region not in regions:
+        known = f"known: {', '.join(regions)}" if regions else "the job has no `regions`"
+        return f"there is no region `{asked.region}` ({known})"
+    if asked.region is None and asked.by != "contribution":
+        return "without a `region` there is nothing to compare with: expected `by: contribution`"
+    if asked.merge and asked.with_objects:
+        return "`merge` gathers classes that `with_objects` would tell apart: choose one of them"
+    return None
+
+
+def _check_regions(loaded: LoadedJob, scene: Scene | None) -> None:
+    """Mesh files can be read, and objects exist."""
+    if not loaded.job.regions:
+        return
+    from queries.errors import QueryError
+    from queries.regions import region
+
+    objects = [thing.name for thing in scene.objects] if scene else []
+    for name, description in loaded.job.regions.items():
+        place = loaded.region_places[name]
+        if scene and description.object is not None and description.object.name not in objects:
+            raise JobError(f"`regions.{name}`: the scene has no object `{description.object.name}` (it has {', '.join(objects)})", place)
+        try:
+            region(description, loaded.folder).check()
+        except QueryError as error:
+            raise JobError(f"`regions.{name}`: {error}", place) from None
+
+
+def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
+    """Every AOV's expression compiles, and names what exists."""
+    job = loaded.job
+    if not job.aovs:
+        return
+    from queries.errors import QueryError
+    from queries.lpe import compile
+
+    names = _names(scene) if scene else None
+    for name, text in job.aovs.items():
+        try:
+            expression = compile(text, job.dialect, objects=names, regions=set(job.regions))
+        except QueryError as error:
+            raise JobError(f"`aovs.{name}`: {error}, in `{text}`", loaded.aov_places[name]) from None
+        if {"unoccluded", "shadows"} & set(expression.prefixes) and not job.record.occluded:
+            prefix = next(prefix for prefix in expression.prefixes if prefix in ("unoccluded", "shadows"))
+            raise JobError(f"`aovs.{name}`: `{prefix};` reads blocked connections: add `record: {{occluded: true}}`", loaded.aov_places[name])
+        for warning in expression.warnings if scene else ():
+            LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
+
+
+def _names(scene: Scene) -> set[str]:
+    """What `@object:`, `@material:` and `@light:` may name."""
+    return {name for thing in scene.objects for name in (thing.name, thing.material)} | {emitter.name for emitter in scene.emitters}

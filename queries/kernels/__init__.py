@@ -1,0 +1,1 @@
+"""Loops over rows of tables, compiled: one file for each question that they answer."""
