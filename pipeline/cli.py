@@ -59,9 +59,7 @@ class Format(StrEnum):
 
 DefineOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--define", metavar="NAME=REGION", help="Define a region, such as 'spot={sphere: {center: [0, 1, 0], radius: 0.2}}'; repeatable."
-    ),
+    typer.Option("--define", metavar="NAME=REGION", help="Define a region, such as 'spot={sphere: {center: [0, 1, 0], radius: 0.2}}'; repeatable."),
 ]
 DialectOption = Annotated[Dialect, typer.Option("--dialect", help="The notation of the expression.")]
 FormatOption = Annotated[Format, typer.Option("--format", help="How rows are printed.")]

@@ -7,21 +7,42 @@ from typing import Any, BinaryIO, cast
 
 import pyarrow as pa
 
-from pipeline.config import Rank
-from pipeline.files import FileRecord, new_file
+from pipeline.config import Job, Rank
+from pipeline.files import FileRecord, checksum, new_file
+from pipeline.progress import Progress
 from pipeline.run_folder import RunFolder
 from queries.regions import parse_region
 from queries.run import Run, open_run
 from queries.sql import write
 
+KINDS = ("csv", "arrow")
 TOP = 20  # classes that a table for people shows
 
 
-def write_ranking(folder: RunFolder, run: Run, name: str, asked: Rank, threads: int) -> dict[str, Any]:
-    """Rank one region of a run and write ``rankings/<name>.csv`` and ``.arrow``; their checksums. Raises QueryError."""
-    table = ranked(run, asked, threads)
-    kinds = {"csv": "csv", "arrow": "arrow"}
-    return {kind: _write(folder.ranking(name, kind), table, format).as_json() for kind, format in kinds.items()}
+def write_rankings(folder: RunFolder, job: Job, known: dict[str, Any], threads: int, bar: Progress) -> dict[str, Any]:
+    """Make every ranking of a job, as ``rankings/<name>.csv`` and ``.arrow``; what was asked, and checksums, by name.
+
+    Those that ``known`` says were made before are kept. Raises QueryError.
+    """
+    made: dict[str, Any] = {}
+    with open_run(folder.path, threads=threads) as run:
+        for name, asked in job.rank.items():
+            question = {"asked": asked.model_dump(mode="json"), "region": job.regions[asked.region].model_dump(mode="json") if asked.region else None}
+            if not _is_there(folder, name, question, known.get(name, {})):
+                table = ranked(run, asked, threads)
+                files = {kind: _write(folder.ranking(name, kind), table, kind).as_json() for kind in KINDS}
+                made[name] = question | files
+            bar.advance(1)
+    return made
+
+
+def _is_there(folder: RunFolder, name: str, question: dict[str, Any], known: dict[str, Any]) -> bool:
+    """Whether the ranking was made before, of the same question, and its files are whole."""
+    try:
+        same = {key: known[key] for key in question} == question
+        return same and all(checksum(folder.ranking(name, kind)) == (known[kind]["bytes"], known[kind]["xxh3"]) for kind in KINDS)
+    except (KeyError, OSError):
+        return False
 
 
 def ranked(run: Run, asked: Rank, threads: int | None) -> pa.Table:

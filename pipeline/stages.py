@@ -113,6 +113,8 @@ class Run:
         film_sum.drop_films(self.folder, self.shards)
         with self.watch.stage("aovs"):
             self._write_aovs()
+        with self.watch.stage("rankings"):
+            self._write_rankings()
         self._save()
         LOG.info("done: %s", self.folder.path)
 
@@ -151,6 +153,7 @@ class Run:
             "film": old.get("film"),
             "catalogues": old.get("catalogues", {}),
             "images": old.get("images", {}),
+            "rankings": old.get("rankings", {}),
             "stats": old.get("stats", {}),
         }
 
@@ -271,6 +274,14 @@ class Run:
         if wanted or not self._has_layers():
             self._write_layers()
 
+    def _write_rankings(self) -> None:
+        """Make every ranking; those of other names are left alone."""
+        if self.job.rank:
+            from pipeline.rankings import write_rankings
+
+            with progress("rankings", len(self.job.rank), "rankings") as bar:
+                self.manifest["rankings"] |= write_rankings(self.folder, self.job, self.manifest["rankings"], self.threads, bar)
+
     def _has_layers(self) -> bool:
         """Whether the layered file was written before, of the same images."""
         known = self.manifest["images"].get(LAYERS, {})
@@ -284,7 +295,8 @@ class Run:
         """Write the image and all AOVs as layers of one EXR, with their expressions, and note its checksum."""
         names = {"": "beauty"} | {name: name for name in self.job.aovs}
         layers = {layer: images.read_exr(self.folder.image(name, "exr")) for layer, name in names.items()}
-        images.write_layers(self.folder.image(LAYERS, "exr"), layers, self._metadata(LAYERS) | self.job.aovs)
+        expressions = {f"expression:{name}": text for name, text in self.job.aovs.items()}
+        images.write_layers(self.folder.image(LAYERS, "exr"), layers, self._metadata(LAYERS) | expressions)
         record = FileRecord(0, *checksum(self.folder.image(LAYERS, "exr"))).as_json()
         self.manifest["images"][LAYERS] = {"expression": None, "expressions": dict(self.job.aovs), "terms": self._terms(), "exr": record}
 

@@ -44,9 +44,7 @@ def images(run: Run | str | os.PathLike[str], expressions: Mapping[str, Expressi
     return {name: found.image for name, found in select(run, expressions, threads).items()}
 
 
-def select(
-    run: Run | str | os.PathLike[str], expressions: Mapping[str, Expression | str | None], threads: int | None = None
-) -> dict[str, Selected]:
+def select(run: Run | str | os.PathLike[str], expressions: Mapping[str, Expression | str | None], threads: int | None = None) -> dict[str, Selected]:
     """The same with numbers of paths; None stands for all paths."""
     with _opened(run, threads) as opened:
         compiled = {name: opened.compile(given) if isinstance(given, str) else given for name, given in expressions.items()}

@@ -5,7 +5,8 @@
   directly, or by way of singular or straight scattering alone, which no emitter sample finds, count as they are.
 - ``shadows;``: the blocked connections alone, at weight 1: the light that is missing in shadows.
 - ``noclamp;``: changes nothing, as nothing is clamped.
-- ``nothruput;``: divides by the walk's throughput on arrival at the last vertex that the path uses, channel by channel; 0 where that is 0.
+- ``nothruput;``: divides by the walk's throughput on arrival at the path's last interaction (at the emitter, where it is seen directly), channel
+  by channel; 0 where that is 0. Emitter hits and samples then still estimate one quantity, the light that the interaction sends back.
 """
 
 from dataclasses import dataclass
@@ -89,9 +90,10 @@ def terms_of(run: Run, expression: Expression | None) -> tuple[Term, ...]:
 
 
 def _last_vertex(piece: Piece, table: str) -> I64:
-    """The row of the last camera vertex that each path uses; -1 where there is none."""
+    """The row of each path's last interaction on the camera side, or of an emitter that is seen directly; -1 where there is none."""
     walk, vertex_walk = piece.column(table, "camera_walk"), piece.column("camera_vertices", "walk")
-    depth, vertex_depth = np.maximum(piece.column(table, "camera_depth"), 1), piece.column("camera_vertices", "depth")
+    hits = piece.column(table, "technique") == EMITTER_HIT  # their last vertex is the emitter
+    depth, vertex_depth = np.maximum(piece.column(table, "camera_depth").astype(np.int64) - hits, 1), piece.column("camera_vertices", "depth")
     start = np.empty(len(walk), np.int64)
     find_walks(walk, vertex_walk, vertex_depth, start)
     row = np.minimum(start + depth - 1, len(vertex_walk) - 1)

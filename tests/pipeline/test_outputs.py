@@ -213,7 +213,7 @@ def test_aovs_as_layers(aov_run: pathlib.Path) -> None:
         layer = pixels[..., [spec.channelnames.index(f"{name}.{channel}") for channel in "RGB"]]
         assert layer.max() > 0
         assert np.array_equal(layer, read_exr(aov_run / f"images/{name}.exr"))
-        assert spec.get_string_attribute(f"pathspace:{name}") == text
+        assert spec.get_string_attribute(f"pathspace:expression:{name}") == text
     beauty = read_exr(aov_run / "images/layers.exr")
     assert np.array_equal(beauty, read_exr(aov_run / "images/beauty.exr"))
     parts = [read_exr(aov_run / f"images/{name}.exr").astype(np.float64) for name in ("seen", "direct", "rest")]

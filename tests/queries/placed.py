@@ -203,7 +203,7 @@ def places(start: Point, end: Point, at: Point | None, thing: str | None) -> set
 
 def inside(name: str, point: Point, thing: str | None) -> bool:
     """Whether a point on an object lies in a region."""
-    (kind, given), = REGIONS[name].items()
+    ((kind, given),) = REGIONS[name].items()
     if kind == "object":
         return bool(thing == given)
     if kind == "sphere":
@@ -213,7 +213,7 @@ def inside(name: str, point: Point, thing: str | None) -> bool:
 
 def crossed(name: str, start: Point, end: Point) -> bool:
     """Whether a segment has a point in a ball or a box."""
-    (kind, given), = REGIONS[name].items()
+    ((kind, given),) = REGIONS[name].items()
     a, d = np.array(start), np.array(end) - np.array(start)
     if kind == "sphere":
         center = np.array(given["center"])

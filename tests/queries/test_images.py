@@ -16,6 +16,7 @@ from queries.kernels.splat import splat_box, splat_filter
 from queries.lpe import compile
 from queries.lpe.parser import parse
 from renderer.filters import reconstruction_filter
+from renderer.tables import EMITTER_HIT
 
 
 def test_beauty_sums_every_path(any_run: SyntheticRun) -> None:
@@ -164,7 +165,7 @@ def test_prefixes_change_what_paths_count(tmp_path: pathlib.Path) -> None:
         throughput = {(row["walk"], row["depth"]): row for row in run.tables["camera_vertices"].to_pylist()}
         bare = []
         for row, color in zip(made.rows["paths"], colors):
-            vertex = throughput.get((row["camera_walk"], max(row["camera_depth"], 1)))
+            vertex = throughput.get((row["camera_walk"], max(row["camera_depth"] - (row["technique"] == EMITTER_HIT), 1)))
             bare.append([value / vertex[f"throughput_{c}"] if vertex else 0.0 for value, c in zip(color, "rgb")])
         np.testing.assert_allclose(aov_image(run, "nothruput; C .* ."), summed(made.rows["paths"], bare, run.settings), rtol=1e-5, atol=1e-6)
 
