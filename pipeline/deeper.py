@@ -51,7 +51,7 @@ FIGURES = (
     Figure("share", REAL, "`cut` over `energy` + `cut`, 0 … 1"),
     Figure("share_error", REAL, "standard error of `share`; NULL where it cannot be trusted"),
     Figure("units", INTEGER, "independent units (replicates, passes or groups of walks) that standard errors rest on"),
-    Figure("trust", TEXT, "why the estimate of the error cannot be trusted; NULL where it can"),
+    Figure("verdict", TEXT, "why the estimate of the error cannot be trusted; NULL where it can"),
 )
 
 
@@ -95,7 +95,7 @@ def cut(run: Run, most: int = MOST_WALKS, traced_to: int = UNBOUNDED_DEPTH, scen
         "share": [float(part.value) * known],
         "share_error": [float(part.error) * trusted],
         "units": [units.count],
-        "trust": [reason or None],
+        "verdict": [reason or None],
     }
     return answer(FIGURES, values)
 

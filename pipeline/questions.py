@@ -1,9 +1,11 @@
 """What a job will ask of its run, checked before hours of rendering: regions, expressions, rankings."""
 
 from collections.abc import Collection
+from typing import Any
 
 from pipeline.config import Rank
 from pipeline.errors import JobError
+from pipeline.files import checksum
 from pipeline.job_file import LoadedJob
 from pipeline.progress import LOG
 from renderer.scene.arrays import Scene
@@ -27,6 +29,15 @@ def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
         problem = _problem(asked, job.regions)
         if problem:
             raise JobError(f"`rank.{name}`: {problem}", loaded.rank_places[name])
+
+
+def region_terms(loaded: LoadedJob) -> dict[str, Any]:
+    """What the job's regions are: their descriptions, and of mesh files the checksums too. Raises OSError where a file is gone."""
+    terms = {name: description.model_dump(mode="json") for name, description in loaded.job.regions.items()}
+    for name, description in loaded.job.regions.items():
+        if description.mesh is not None:
+            terms[name]["xxh3"] = checksum(loaded.folder / description.mesh.file)[1]
+    return terms
 
 
 def _problem(asked: Rank, regions: Collection[str]) -> str | None:
@@ -80,6 +91,14 @@ def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
             LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
 
 
-def _names(scene: Scene) -> set[str]:
-    """What `@object:`, `@material:` and `@light:` may name."""
-    return {name for thing in scene.objects for name in (thing.name, thing.material)} | {emitter.name for emitter in scene.emitters}
+def _names(scene: Scene) -> dict[str, set[str]]:
+    """What `@object:`, `@material:` and `@light:` may name, and which of them."""
+    found: dict[str, set[str]] = {}
+    for kind, names in (
+        ("object", [thing.name for thing in scene.objects]),
+        ("material", [thing.material for thing in scene.objects]),
+        ("light", [emitter.name for emitter in scene.emitters]),
+    ):
+        for name in names:
+            found.setdefault(name, set()).add(kind)
+    return found

@@ -20,6 +20,7 @@ from pipeline.files import FileRecord, checksum, clear_errors
 from pipeline.identity import camera, differences, processor, renderer_version, settings_as_json, versions
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
+from pipeline.questions import region_terms
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
 from pipeline.shards import Shard, plan_shards, shard_count, shard_size
 from renderer.film import Film
@@ -280,7 +281,9 @@ class Run:
             from pipeline.rankings import write_rankings
 
             with progress("rankings", len(self.job.rank), "rankings") as bar:
-                self.manifest["rankings"] |= write_rankings(self.folder, self.job, self.manifest["rankings"], self.threads, bar)
+                for name, made in write_rankings(self.folder, self.job, self.regions, self.manifest["rankings"], self.threads, bar):
+                    self.manifest["rankings"][name] = made
+                    self._save()  # an interrupted job goes on with the next ranking
 
     def _has_layers(self) -> bool:
         """Whether the layered file was written before, of the same images."""
@@ -321,8 +324,12 @@ class Run:
 
     def _terms(self) -> dict[str, Any]:
         """What expressions mean in this job: their dialect and its regions."""
-        job = self.job.model_dump(mode="json")
-        return {"dialect": job["dialect"], "regions": job["regions"]}
+        return {"dialect": self.job.dialect, "regions": self.regions}
+
+    @functools.cached_property
+    def regions(self) -> dict[str, Any]:
+        """The job's regions, as images and rankings depend on them."""
+        return region_terms(self.prepared.loaded)
 
     def _metadata(self, name: str) -> dict[str, str]:
         """What an image file says of the run."""

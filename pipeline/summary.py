@@ -49,4 +49,11 @@ def summary(manifest: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "peak memory", human_bytes(stats.get("peak_rss_bytes", 0))
     yield "stages", ", ".join(f"{name} {seconds:.1f} s" for name, seconds in stats.get("stages", {}).items())
     yield "images", ", ".join(f"{name} ({image['expression']})" if image["expression"] else name for name, image in manifest["images"].items())
+    if manifest.get("rankings"):
+        yield (
+            "rankings",
+            ", ".join(
+                f"{name} ({known['asked']['region'] or 'whole image'}, by {known['asked']['by']})" for name, known in manifest["rankings"].items()
+            ),
+        )
     yield "versions", ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())

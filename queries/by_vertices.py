@@ -176,10 +176,13 @@ class Paths:
         start, end = self.camera_ends, self.emitter_points
         if len(light.points):
             start = _put_ends(start.copy(), light, 1)
-        directions = np.flatnonzero(self._infinite & self._sampled_here)
-        if len(directions):
+        infinite = np.flatnonzero(self._infinite)
+        if len(infinite):
+            # A light walk left a disk outside the scene: its ray leads there, and on
+            ways = np.where(self._sampled_here[infinite, None], end[infinite], end[infinite] - start[infinite])
+            ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.float32(1e-30))
             end = end.copy()
-            end[directions] = start[directions] + self._far * end[directions]
+            end[infinite] = start[infinite] + self._far * ways
         return start, end
 
     @property

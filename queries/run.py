@@ -102,17 +102,18 @@ class Run:
         """A light path expression whose names are those of this run. Raises ``ExpressionError``."""
         from queries.lpe import compile
 
-        expression = compile(text, dialect, self.names, self.regions)
-        if any(test.field == "medium" for step in expression.alphabet.steps for test in step.tests):
-            expression.warnings = (*expression.warnings, "`@medium:` matches nothing: runs have no media")
-        return expression
+        return compile(text, dialect, self.names, self.regions)
 
     @functools.cached_property
-    def names(self) -> frozenset[str]:
-        """The names of objects, materials and emitters."""
-        objects, emitters = self.tables["objects"], self.tables["emitters"]
-        listed = (*objects["name"].to_pylist(), *objects["material"].to_pylist(), *emitters["name"].to_pylist())
-        return frozenset(name for name in listed if name)
+    def names(self) -> dict[str, frozenset[str]]:
+        """The names of objects, materials and emitters, each with what it names: ``object``, ``material``, ``light``."""
+        listed = {"object": ("objects", "name"), "material": ("objects", "material"), "light": ("emitters", "name")}
+        found: dict[str, set[str]] = {}
+        for kind, (table, column) in listed.items():
+            for name in self.tables[table][column].to_pylist():
+                if name:
+                    found.setdefault(name, set()).add(kind)
+        return {name: frozenset(kinds) for name, kinds in found.items()}
 
     def sql(self, text: str, time_limit: float | None = 60.0) -> pa.Table:
         """The answer to a query as an Arrow table (``queries.sql.query``)."""
@@ -219,7 +220,7 @@ def _table_files(folder: pathlib.Path, manifest: dict[str, Any], shards: range |
     """The files of each table, in the shards' order, with the sizes that they must have."""
     found: dict[str, list[tuple[str, int]]] = {}
     try:
-        for shard in shards or range(manifest["shards"]["count"]):
+        for shard in range(manifest["shards"]["count"]) if shards is None else shards:
             record = f"shards/{shard:05d}.json"
             for file, known in json.loads((folder / record).read_bytes())["files"].items():
                 parts = pathlib.PurePosixPath(file).parts

@@ -17,9 +17,11 @@ from queries.lpe_views import make_views
 from queries.run import Run
 
 TIME_LIMIT = 60.0  # seconds
+_LONGEST = 100_000  # characters: DuckDB's planner cannot be stopped, and is slow where a text lists tens of thousands of things
+_AGAIN = 0.05  # seconds between attempts to stop a query: DuckDB forgets one that comes between two statements
 _ALLOWED = {"SELECT", "EXPLAIN", "CREATE", "INSERT", "UPDATE", "DELETE", "DROP", "ALTER"}
 _BATCH = 100_000  # rows
-_WIDEST = 60  # characters of a cell in text tables
+_WIDEST, _WIDEST_LAST = 60, 10_000  # characters of a cell in text tables, and of one in the last column
 
 
 @contextlib.contextmanager
@@ -32,21 +34,23 @@ def stream(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> Iterat
     Raises ``QueryError`` for bad SQL and for statements that reach outside, ``QueryTimeout`` after ``time_limit`` seconds.
     """
     connection = run.connect()
-    timed_out = threading.Event()
+    timed_out, done = threading.Event(), threading.Event()
 
-    def stop() -> None:
-        timed_out.set()
-        connection.interrupt()
+    def stop_when_late() -> None:
+        if not done.wait(time_limit):
+            timed_out.set()
+            connection.interrupt()
+            while not done.wait(_AGAIN):
+                connection.interrupt()
 
     def check() -> None:
         if timed_out.is_set():
             raise QueryTimeout(late)
 
     late = "" if time_limit is None else f"the query was stopped after {time_limit:g} seconds: ask for less, or raise the time limit (--time-limit)"
-    timer = threading.Timer(time_limit, stop) if time_limit is not None else None
+    timer = threading.Thread(target=stop_when_late, daemon=True) if time_limit is not None else None
     try:
         if timer:
-            timer.daemon = True
             timer.start()
         yield _answer(run, connection, text, check)
     except (duckdb.Error, pa.ArrowException, OSError) as error:
@@ -54,8 +58,9 @@ def stream(run: Run, text: str, time_limit: float | None = TIME_LIMIT) -> Iterat
             raise QueryTimeout(late) from None
         raise QueryError(str(error)) from None
     finally:
+        done.set()
         if timer:
-            timer.cancel()
+            timer.join()
         run.disconnect(connection)
 
 
@@ -74,6 +79,8 @@ def _answer(run: Run, connection: duckdb.DuckDBPyConnection, text: str, check: C
     """Run all statements; the answer to the last."""
     if any(0xD800 <= ord(character) < 0xE000 for character in text):
         raise QueryError("expected SQL as Unicode text, found half of a surrogate pair")
+    if len(text) > _LONGEST:
+        raise QueryError(f"expected SQL of at most {_LONGEST:,} characters, found {len(text):,}")
     statements = connection.extract_statements(make_views(run, connection, text, check))
     if not statements:
         raise QueryError("expected an SQL statement, found none")
@@ -85,7 +92,12 @@ def _answer(run: Run, connection: duckdb.DuckDBPyConnection, text: str, check: C
         if kind not in _ALLOWED:
             raise QueryError(f"a run is read-only: expected SELECT (or a temporary CREATE, INSERT, …), found a statement of kind {kind}")
     for statement in statements[:-1]:
-        connection.execute(statement)
+        check()
+        answer = connection.sql(statement)
+        # An answer that was begun must be read to its end before the next statement
+        for _ in answer.to_arrow_reader(_BATCH) if answer is not None else ():
+            check()
+    check()
     return batches(connection, statements[-1])
 
 
@@ -157,9 +169,11 @@ def _write_table(reader: pa.RecordBatchReader, out: BinaryIO, most: int = 200) -
         if len(shown) < most:
             shown += [[_cell(value) for value in row] for row in _rows(batch.slice(0, most - len(shown)))]
         count += batch.num_rows
+    # The last column is there to be copied: an expression, say. Nothing is to its right
+    shown = [[*(_cut(cell, _WIDEST) for cell in row[:-1]), *(_cut(cell, _WIDEST_LAST) for cell in row[-1:])] for row in shown]
     numeric = [pa.types.is_integer(kind) or pa.types.is_floating(kind) for kind in reader.schema.types]
     widths = [max(len(name), *(len(row[i]) for row in shown), 0) for i, name in enumerate(reader.schema.names)]
-    rule = ["─" * width for width in widths]
+    rule = ["─" * min(width, _WIDEST) for width in widths]
     for row in [list(reader.schema.names), rule, *shown]:
         cells = [cell.rjust(width) if right else cell.ljust(width) for cell, width, right in zip(row, widths, numeric)]
         out.write(("  ".join(cells).rstrip() + "\n").encode())
@@ -170,8 +184,11 @@ def _write_table(reader: pa.RecordBatchReader, out: BinaryIO, most: int = 200) -
 def _cell(value: Any) -> str:
     if value is None:
         return "NULL"
-    text = f"{value:.6g}" if isinstance(value, float) else " ".join(str(value).split("\n"))
-    return text if len(text) <= _WIDEST else text[: _WIDEST - 1] + "…"
+    return f"{value:.6g}" if isinstance(value, float) else " ".join(str(value).split("\n"))
+
+
+def _cut(text: str, widest: int) -> str:
+    return text if len(text) <= widest else text[: widest - 1] + "…"
 
 
 _WRITERS: dict[str, Callable[[pa.RecordBatchReader, BinaryIO], int]] = {

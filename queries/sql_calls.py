@@ -21,6 +21,7 @@ _TOKEN = re.compile(
     re.VERBOSE | re.DOTALL,
 )
 _ESCAPED = re.compile(r"[eE]'(?:[^'\\]|''|\\.)*'", re.DOTALL)
+_COMMENT_MARK = re.compile(r"/\*|\*/")
 _CODE = ("string", "name", "dollar", "word", "other")
 
 
@@ -119,10 +120,9 @@ def _tokens(sql: str) -> Iterator[_Token]:
 
 def _comment_end(sql: str, start: int) -> int:
     """Where a comment ends; comments nest."""
-    depth, at = 0, start
-    for mark in re.finditer(r"/\*|\*/", sql[start:]):
+    depth = 0
+    for mark in _COMMENT_MARK.finditer(sql, start):
         depth += 1 if mark.group() == "/*" else -1
-        at = start + mark.end()
         if depth == 0:
-            return at
+            return mark.end()
     return len(sql)

@@ -178,6 +178,8 @@ def verdicts(moments: Moments) -> list[str]:
 
 
 def _verdict(walks: float, share: float, squares: float) -> str:
+    if walks == 0:
+        return "no walks"
     if share > LARGEST_SHARE:
         return f"one walk of {walks:,.0f} carries {share:.0%} of the squares"
     if squares < FEWEST_SQUARES:

@@ -72,7 +72,8 @@ class Symbols:
     def interactions(self, event: I32, thing: I32) -> I32:
         """Symbols by kind of event, object and bits: int32 (events, objects, 2^places), for the given events at objects (-1 elsewhere)."""
         kinds = {row["key"]: row for row in self._run.tables["events"].to_pylist()}
-        table = np.full((256, len(self.objects), 1 << len(self.places)), -1, np.int32)
+        keys = 1 + max([*kinds, int(event.max(initial=0))])
+        table = np.full((keys, len(self.objects), 1 << len(self.places)), -1, np.int32)
         present = np.zeros(table.shape[:2], np.bool_)
         inside = thing < len(self.objects)
         present[event[inside], thing[inside]] = True

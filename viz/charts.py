@@ -1,4 +1,4 @@
-"""Charts of plain numbers: error against time, and rates side by side. Lines and bars carry their own names."""
+"""Charts of plain numbers: error against time, rates and times side by side. Lines and bars carry their own names."""
 
 import pathlib
 from collections.abc import Sequence
@@ -32,6 +32,17 @@ class RateBar:
     rate: float
     low: float
     high: float
+
+
+@dataclass(frozen=True)
+class TimeBar:
+    """How long something took, in seconds: the median, and the range over rounds. ``ours``: whether it is what we measure, or what is beside it."""
+
+    name: str
+    seconds: float
+    low: float
+    high: float
+    ours: bool
 
 
 def error_chart(path: pathlib.Path, curves: Sequence[ErrorCurve], title: str) -> None:
@@ -140,6 +151,28 @@ def rate_chart(path: pathlib.Path, bars: Sequence[RateBar], title: str) -> None:
     axes.spines["left"].set_visible(False)
     axes.set_xlabel("million samples per second of wall time (median and range)")
     axes.margins(x=0.1)
+    save(figure, path)
+
+
+def time_chart(path: pathlib.Path, bars: Sequence[TimeBar], title: str) -> None:
+    """Seconds as points on a logarithmic axis, one line for each thing that was timed, with the range over rounds. Writes a PNG."""
+    figure, axes = new_chart((8.4, 1.1 + 0.4 * len(bars)), title)
+    axes.set_xscale("log")
+    for i, bar in enumerate(bars):
+        color = COLORS[0] if bar.ours else COLORS[1]
+        axes.axhline(i, color=FAINT, linewidth=0.7, zorder=1)
+        axes.errorbar(
+            bar.seconds, i, xerr=[[bar.seconds - bar.low], [bar.high - bar.seconds]], color=color, fmt="o", markersize=9, capsize=3, zorder=3
+        )
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 2.0}
+        axes.annotate(f"{bar.seconds:.2g} s", (bar.high, i), (9, 0), textcoords="offset points", va="center_baseline", color=INK, bbox=box, zorder=2)
+    axes.set_yticks(range(len(bars)), [bar.name for bar in bars])
+    axes.invert_yaxis()
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_xlabel("wall time (s), median and range")
+    axes.margins(x=0.12, y=0.12)
+    plain_seconds(axes)
     save(figure, path)
 
 

@@ -11,13 +11,14 @@ from pipeline.bench.results import Row, SectionResult, markdown_table
 from pipeline.bench.session import Session
 from pipeline.bench.timing import Timing, alternate, ratio, spread
 from pipeline.bench.worker import Worker
+from pipeline.errors import JobError
 from pipeline.progress import LOG
 from pipeline.run_folder import RunFolder
 from pipeline.stages import run_job
 
 MOST_BYTES = 2e9
 AGAIN = ("mitsuba_llvm", "mitsuba_scalar")  # who renders again: the first that this machine has
-REGEX = "regular expression for each path, in Python"
+REGEX = "a Python regex for each path"
 
 
 def measure_questions(session: Session) -> SectionResult:
@@ -98,7 +99,7 @@ def _check_regex(worker: Worker, session: Session) -> None:
     first = next(q for q in asked.ask if q.expression)
     theirs, ours = worker.ask(regex=asked.regex)["matched"], worker.ask(count=first.expression)["matched"]
     if theirs != ours:
-        raise ValueError(f"the regular expression `{asked.regex}` finds {theirs} paths, `{first.expression}` finds {ours}: not the same question")
+        raise JobError(f"the regular expression `{asked.regex}` finds {theirs} paths, `{first.expression}` finds {ours}: not the same question")
 
 
 def _mitsuba(session: Session) -> tuple[str, Contender | None]:
@@ -119,8 +120,8 @@ def _mitsuba(session: Session) -> tuple[str, Contender | None]:
 
 def _row(question: Question, walls: dict[str, list[float]], others: list[str], paths: int) -> Row:
     found = spread(walls[question.what])
-    against = "; ".join(f"{ratio(walls[question.what], walls[who]).median:.3g} × {who}" for who in others)
-    measured = f"{found.text('.3f', ' s')} on {paths / 1e6:.1f} M paths" + (f"; {against}" if against else "")
+    against = "".join(f"; {ratio(walls[question.what], walls[who]).median:.3f} × {who}" for who in others)
+    measured = f"{found.text('.2f', ' s')} on {paths / 1e6:.1f} M paths{against}"
     return Row(question.what, f"≤ {question.most_seconds:g} s", measured, found.median <= question.most_seconds)
 
 

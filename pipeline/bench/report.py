@@ -81,7 +81,7 @@ def markdown(about: Mapping[str, Any], session: Session, results: Mapping[str, S
 
 def write_charts(out: pathlib.Path, session: Session, results: Mapping[str, SectionResult]) -> dict[str, str]:
     """The charts of the sections that were measured: file names by section."""
-    from viz.charts import ErrorCurve, RateBar, error_chart, rate_chart
+    from viz.charts import ErrorCurve, RateBar, TimeBar, error_chart, rate_chart, time_chart
 
     charts: dict[str, str] = {}
     where = f"{session.benchmark.name}: {session.settings.width} × {session.settings.height} pixels, depth {session.settings.max_depth}"
@@ -97,6 +97,12 @@ def write_charts(out: pathlib.Path, session: Session, results: Mapping[str, Sect
                 bars.append(RateBar(LABELS[name], walks / wall.median, walks / wall.high, walks / wall.low))
         rate_chart(out / "rates.png", bars, f"Rates, {where}, {session.settings.passes} samples")
         charts["rates"] = "rates.png"
+    if "questions" in results:
+        figures, asked = results["questions"].figures, {question.what for question in session.benchmark.questions.ask}
+        walls = {what: spread(seconds) for what, seconds in figures["wall_seconds"].items()}
+        times = [TimeBar(what, wall.median, wall.low, wall.high, what in asked) for what, wall in walls.items()]
+        time_chart(out / "questions.png", times, f"Questions of {figures['paths'] / 1e6:.1f} million paths, {where}")
+        charts["questions"] = "questions.png"
     return charts
 
 

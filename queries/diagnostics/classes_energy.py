@@ -11,8 +11,7 @@ from queries.lpe.descriptors import class_expression
 from queries.run import Run
 
 FIGURES = (
-    Figure("class", TEXT, "an expression that selects the paths of the class (from all lights, where its own has no name)"),
-    Figure("words", TEXT, "the class in words"),
+    Figure("description", TEXT, "the class in words"),
     Figure("paths", INTEGER, "recorded paths, or lobes' shares of one"),
     Figure("samples", INTEGER, "walks that have such paths"),
     Figure("energy", REAL, "what the class adds to the image's mean luminance, of linear sRGB"),
@@ -23,15 +22,16 @@ FIGURES = (
     Figure("effective_samples", REAL, "how many walks of equal value would have the same relative variance"),
     Figure("efficiency", REAL, "1 / (variance x render seconds of the whole run, all classes together); NULL where it cannot be trusted"),
     Figure("units", INTEGER, "independent units (replicates, passes or groups of walks) that standard errors rest on"),
-    Figure("trust", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
+    Figure("verdict", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
+    Figure("expression", TEXT, "selects the paths of the class (from all lights, where its own has no name)"),
 )
 
 
-def classes(run: Run, with_objects: bool = False, most: int = 1000) -> pa.Table:
+def classes(run: Run, with_objects: bool = False, most: int | None = None) -> pa.Table:
     """What each class contributes, how noisily, and at what cost (columns: ``FIGURES``), the largest energy first.
 
-    ``with_objects``: paths also differ by the objects that they meet, which expressions and words then name; ``most``: how many classes
-    at most. Raises ``QueryError`` for a run without paths.
+    ``with_objects``: paths also differ by the objects that they meet, which expressions and descriptions then name; ``most``: how many classes
+    at most (None: all). Raises ``QueryError`` for a run without paths.
     """
     require_paths(run)
     found = PathClasses(run, with_objects, threads=run.threads)
@@ -40,8 +40,8 @@ def classes(run: Run, with_objects: bool = False, most: int = 1000) -> pa.Table:
     error, energy = sums.trusted_error, sums.energy
     spelled = [(found.letters(int(number)), found.objects(int(number))) for number in order]
     values = {
-        "class": [class_expression(letters, objects) for letters, objects in spelled],
-        "words": [describe_class(letters, objects) for letters, objects in spelled],
+        "expression": [class_expression(letters, objects) for letters, objects in spelled],
+        "description": [describe_class(letters, objects) for letters, objects in spelled],
         "paths": sums.moments.rows[order].astype(np.int64),
         "samples": sums.moments.walks[order].astype(np.int64),
         "energy": energy[order],
@@ -52,7 +52,7 @@ def classes(run: Run, with_objects: bool = False, most: int = 1000) -> pa.Table:
         "effective_samples": sums.effective[order],
         "efficiency": efficiency(run, error**2)[order],
         "units": [sums.units] * len(order),
-        "trust": [sums.reasons[number] or None for number in order],
+        "verdict": [sums.reasons[number] or None for number in order],
     }
     return answer(FIGURES, values)
 

@@ -13,21 +13,23 @@ import pyarrow as pa
 from queries.classify import Classifier
 from queries.diagnostics.answers import F64, INTEGER, REAL, TEXT, Figure, answer, pixels_of, require_paths
 from queries.errors import QueryError
-from queries.kernels.series import add_by_pass
 from queries.run import Run
 from queries.shards import Piece, map_shards
+from queries.statistics import Moments, Units, verdicts
+from queries.tally import Tally
 
 LEAST_POINTS = 4  # of a fitted slope
 
 FIGURES = (
     Figure("passes", INTEGER, "samples of each pixel so far"),
     Figure("mean", REAL, "mean luminance of the image so far, of linear sRGB"),
-    Figure("variance", REAL, "variance so far of one unit's mean luminance, squared luminance"),
+    Figure("variance", REAL, "variance so far of one unit's mean luminance, squared luminance; NULL where it cannot be trusted"),
     Figure("units", INTEGER, "how many independent units there are so far"),
     Figure("unit", TEXT, "what a unit is: a pass, or a replicate of Sobol' passes"),
-    Figure("standard_error", REAL, "standard error of the mean, luminance; NULL below two units"),
-    Figure("relative_error", REAL, "standard error over mean"),
-    Figure("slope", REAL, "slope, fitted so far, of log error against log passes: -1/2 for independent samples, steeper for Sobol' ones"),
+    Figure("standard_error", REAL, "standard error of the mean, luminance; NULL below two units and where it cannot be trusted"),
+    Figure("relative_error", REAL, "standard error over mean; NULL as that is"),
+    Figure("slope", REAL, "slope of log error against log passes, fitted to the errors so far: -1/2 for independent samples, steeper for Sobol'"),
+    Figure("verdict", TEXT, "why the estimate of variance cannot be trusted so far; NULL where it can"),
 )
 
 
@@ -68,10 +70,14 @@ def convergence(run: Run, expression: str | None = None, most: int = 256) -> pa.
     require_paths(run)
     if most < 1:
         raise QueryError(f"expected at least one row, found most = {most}")
-    values = pass_means(run, expression)
+    light, moments = _by_pass(run, expression)
+    values = light / (pixels_of(run) * run.settings["keep"])
     sobol = run.settings.get("sampler") == "sobol"
     steps = _replicated(values, int(run.settings["replicates"])) if sobol else _independent(values)
     mean, variance, units, error = steps
+    reasons = _reasons(moments, units)
+    trusted = np.where([reason == "" for reason in reasons], 1.0, np.nan)
+    variance, error = variance * trusted, error * trusted
     passes = np.arange(1, len(values) + 1)
     shown = _shown(len(values), most)
     relative = np.where(mean > 0, error / np.where(mean > 0, mean, 1.0), np.nan)
@@ -85,27 +91,41 @@ def convergence(run: Run, expression: str | None = None, most: int = 256) -> pa.
             "unit": ["replicate" if sobol else "pass"] * len(shown),
             "standard_error": error[shown],
             "relative_error": relative[shown],
-            "slope": _slopes(passes, units, error)[shown],
+            "slope": (_slopes(passes, units, error) * trusted)[shown],
+            "verdict": [reasons[i] or None for i in shown],
         },
     )
 
 
 def pass_means(run: Run, expression: str | None = None) -> F64:
     """Mean luminance of each pass's image, float64 (passes); the mean of them is the image's."""
-    passes, pixels = int(run.settings["passes"]), pixels_of(run)
+    return np.asarray(_by_pass(run, expression)[0] / (pixels_of(run) * run.settings["keep"]))
+
+
+def _by_pass(run: Run, expression: str | None) -> tuple[F64, Moments]:
+    """The recorded light of each pass, float64 (passes), and the moments of its walks."""
+    units, passes, pixels = Units.of_run(run), int(run.settings["passes"]), pixels_of(run)
     select = _selector(run, expression)
 
-    def work(pieces: Iterator[Piece]) -> F64:
-        sums = np.zeros(passes)
+    def work(pieces: Iterator[Piece]) -> Tally:
+        tally = Tally(passes, units)
         for piece in pieces:
-            r, g, b = (piece.column("paths", f"contribution_{channel}") for channel in "rgb")
-            add_by_pass(piece.owner(), select(piece), r, g, b, pixels, sums)
-        return sums
+            tally.add(piece, np.where(select(piece), piece.owner() // pixels, -1).astype(np.int32))
+        return tally.compact()
 
-    total = np.zeros(passes)
-    for sums in map_shards(run.shard_files, work, run.threads):
-        total += sums
-    return np.asarray(total / (pixels * run.settings["keep"]))
+    whole = Tally(passes, units)
+    for part in map_shards(run.shard_files, work, run.threads):
+        whole.merge(part)
+    return np.asarray(whole.sums.sum(axis=1)), whole.moments
+
+
+def _reasons(moments: Moments, units: npt.NDArray[np.int64]) -> list[str]:
+    """Why the variance cannot be trusted after each pass; "" where it can."""
+    so_far = Moments(*map(np.cumsum, moments))._replace(largest=np.maximum.accumulate(moments.largest))
+    return [
+        reason if count > 1 else "one unit only, which tells nothing of differences"
+        for reason, count in zip(verdicts(so_far), units.tolist(), strict=True)
+    ]
 
 
 def _selector(run: Run, expression: str | None) -> Callable[[Piece], npt.NDArray[np.bool_]]:

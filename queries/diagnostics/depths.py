@@ -28,7 +28,7 @@ FIGURES = (
     Figure("roulette", INTEGER, "recorded walks that Russian roulette ended at their vertex of this depth"),
     Figure("depth_limit", INTEGER, "recorded walks that `max_depth` ended at their vertex of this depth"),
     Figure("units", INTEGER, "independent units (replicates, passes or groups of walks) that standard errors rest on"),
-    Figure("trust", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
+    Figure("verdict", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
 )
 
 
@@ -47,7 +47,7 @@ def depths(run: Run) -> pa.Table:
         "standard_error": sums.trusted_error[shown],
         **{name: ends[event, shown] for name, event in _ENDS.items()},
         "units": [sums.units] * len(shown),
-        "trust": [sums.reasons[number] or None if sums.moments.rows[number] > 0 else None for number in shown],
+        "verdict": [sums.reasons[number] or None if sums.moments.rows[number] > 0 else None for number in shown],
     }
     return answer(FIGURES, values)
 

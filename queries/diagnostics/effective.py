@@ -21,7 +21,7 @@ FIGURES = (
     Figure("standard_error", REAL, "standard error of `energy`; NULL where it cannot be trusted"),
     Figure("efficiency", REAL, "1 / (variance x render seconds of the whole run); NULL where it cannot be trusted"),
     Figure("units", INTEGER, "independent units (replicates, passes or groups of walks) that standard errors rest on"),
-    Figure("trust", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
+    Figure("verdict", TEXT, "why the estimate of variance cannot be trusted; NULL where it can"),
 )
 
 
@@ -54,7 +54,7 @@ def effective(run: Run) -> pa.Table:
         "standard_error": error,
         "efficiency": efficiency(run, error**2),
         "units": [whole.units] * len(energy),
-        "trust": [reason or None for reason in (*whole.reasons, *(parts.reasons[number] for number in used))],
+        "verdict": [reason or None for reason in (*whole.reasons, *(parts.reasons[number] for number in used))],
     }
     return answer(FIGURES, values)
 

@@ -30,21 +30,23 @@ FIGURES = (
     Figure("walk", INTEGER, "the walk's id, by which it can be traced again"),
     Figure("path", INTEGER, "the path's ordinal within the walk"),
     Figure("technique", TEXT, "how the path's two ends were joined"),
-    Figure("class", TEXT, "an expression for paths with these events"),
-    Figure("words", TEXT, "the path in words"),
+    Figure("description", TEXT, "the path in words"),
     Figure("objects", TEXT, "the objects that it meets, from the camera outward"),
     Figure("emitter", TEXT, "the emitter's name"),
     Figure("path_luminance", REAL, "luminance of the path's contribution, before it is divided by the passes"),
     Figure("walk_share", REAL, "the path's share, 0 … 1, of what its walk adds to the pixel"),
+    Figure("expression", TEXT, "selects the paths with these events"),
 )
 
 
-def fireflies(run: Run, variance_share: float = 0.25, deviations: float = 8.0, radius: int = 2, most: int = 100, path_share: float = 0.1) -> pa.Table:
+def fireflies(
+    run: Run, variance_share: float = 0.25, deviations: float = 8.0, radius: int = 2, most: int | None = None, path_share: float = 0.1
+) -> pa.Table:
     """The paths that make pixels stand out (columns: ``FIGURES``), pixels with the largest excess first; ``outliers`` has the rule.
 
     ``variance_share``: 0 … 1, also the least that a listed walk has; ``deviations``: spreads; ``radius``: pixels, of the square around; ``most``: how
-    many pixels at most; ``path_share``: 0 … 1, paths that carry less of their walk's value are left out. Two passes over the paths. Raises
-    ``QueryError`` for a run without paths, or with fewer than ``LEAST_WALKS`` recorded walks for each pixel.
+    many pixels at most (None: all); ``path_share``: 0 … 1, paths that carry less of their walk's value are left out. Two passes over the paths.
+    Raises ``QueryError`` for a run without paths, or with fewer than ``LEAST_WALKS`` recorded walks for each pixel.
     """
     require_paths(run)
     sums = pixel_sums(run)
@@ -101,8 +103,8 @@ def _provenance(run: Run, sums: PixelSums, found: Outliers, rows: dict[str, Arra
             "walk": rows["walk"],
             "path": rows["path"].astype(np.int64),
             "technique": [TECHNIQUES[int(key)] for key in rows["technique"]],
-            "class": [path.expression for path in paths],
-            "words": [path.words for path in paths],
+            "expression": [path.expression for path in paths],
+            "description": [path.words for path in paths],
             "objects": [", ".join(path.objects) for path in paths],
             "emitter": [path.emitter for path in paths],
             "path_luminance": luminance[kept],

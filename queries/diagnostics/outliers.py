@@ -38,8 +38,8 @@ class Outliers:
     typical: F64
     spread: F64
 
-    def first(self, count: int) -> "Outliers":
-        """The first ``count`` of them."""
+    def first(self, count: int | None) -> "Outliers":
+        """The first ``count`` of them (None: all)."""
         return Outliers(self.pixel[:count], self.typical[:count], self.spread[:count])
 
 

@@ -26,12 +26,19 @@ class Provenance:
 
     def __init__(self, run: Run) -> None:
         self._words = run.words
+        self._known: dict[tuple[Any, ...], PathProvenance] = {}
         self._events = {row["key"]: f"{row['type']}{row['scattering'] or ''}" for row in run.tables["events"].to_pylist()}
         self._objects = {row["object"]: row["name"] for row in run.tables["objects"].to_pylist()}
         self._emitters = {row["emitter"]: row for row in run.tables["emitters"].to_pylist()}
 
     def of(self, path: Mapping[str, Any]) -> PathProvenance:
-        """A path by its columns ``emitter``, and ``camera_word`` and ``light_word`` where the run stores them."""
+        """A path by its columns ``emitter``, and ``camera_word`` and ``light_word`` where the run stores them. Each kind is spelled once."""
+        key = path["emitter"], path.get("camera_word"), path.get("light_word")
+        if key not in self._known:
+            self._known[key] = self._spell(path)
+        return self._known[key]
+
+    def _spell(self, path: Mapping[str, Any]) -> PathProvenance:
         camera = self._spelled(path.get("camera_word"), CAMERA)[::-1]
         met = [*camera, *self._spelled(path.get("light_word"), LIGHT)]
         emitter = self._emitters[int(path["emitter"])]

@@ -80,7 +80,7 @@ def mark_used(prefixes: Prefixes, used: Chosen) -> None:
 @kernel
 def read(automaton: Automaton, state: np.int32, event: np.uint8, thing: np.uint16, bits: np.uint8) -> np.int32:
     """The state after one more interaction."""
-    if state < 0 or thing >= automaton.symbols.shape[1]:
+    if state < 0 or event >= automaton.symbols.shape[0] or thing >= automaton.symbols.shape[1]:
         return DEAD
     symbol = automaton.symbols[event, thing, bits]
     if symbol < 0:

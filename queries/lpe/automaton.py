@@ -20,6 +20,8 @@ _BOOLEAN: dict[str, Callable[[bool, bool], bool]] = {
     "^": lambda a, b: a != b,
 }
 
+_OPERAND = 20_000  # steps that one more operand counts for, however small its automaton is
+
 
 @dataclass(frozen=True)
 class Automaton:
@@ -49,6 +51,7 @@ def _combined(node: Node, letters: Letters, work: Work) -> Dfa:
     if isinstance(node, Combination):
         dfa = _combined(node.first, letters, work)
         for operator, operand in node.rest:
+            work.spend(_OPERAND)
             dfa = minimize(combine(dfa, _combined(operand, letters, work), _BOOLEAN[operator], work), work)
         return dfa
     if isinstance(node, Choice) and combines(node):

@@ -74,7 +74,7 @@ def describe_class(letters: Sequence[str], objects: Sequence[str | None] | None 
         return _long(letters, names)
     seen = ", then".join(view_words(View(stop.type, stop.object)) for stop in reversed(view))
     if not surface:
-        return source_words(source) + (seen or " itself")
+        return source_words(source) + (seen or " seen directly")
     onto = f" onto {name_words(surface[0].object)}" if surface[0].object else ""
     return _effect(surface[0], way) + onto + _from(source) + seen
 

@@ -95,8 +95,8 @@ class Expression:
         return read_backward(self.dfa, Work())
 
     def describe(self) -> str:
-        """The expression in plain words."""
-        return explain(self.tree)
+        """The expression in plain words, its prefixes last."""
+        return explain(self.tree, self.prefixes)
 
     def arrays(self) -> Arrays:
         """The automaton and its alphabet as plain arrays."""

@@ -1,5 +1,7 @@
 """Syntax tree to plain words, for people who do not read the notation."""
 
+from collections.abc import Sequence
+
 from queries.lpe.phrases import phrase_of
 from queries.lpe.syntax import NAMED_FIELDS, NUMBERED_FIELDS, Chain, Choice, Node, Repeat, Step, Test
 
@@ -35,18 +37,25 @@ _FIELDS = {
     "s": ("with s = {} (vertices sampled from the light)", "not with s = {} (vertices sampled from the light)"),
     "t": ("with t = {} (vertices sampled from the camera)", "not with t = {} (vertices sampled from the camera)"),
 }
+_PREFIXES = {
+    "unoccluded": "as if nothing cast a shadow",
+    "shadows": "blocked connections alone, the light that is missing in shadows",
+    "noclamp": "without clamping",
+    "nothruput": "without the walk's throughput up to the last interaction",
+}
 _ORDINALS = ("first", "second", "third")
 
 
-def explain(node: Node) -> str:
-    """The expression in words, a short phrase first where there is one that says exactly the same.
+def explain(node: Node, prefixes: Sequence[str] = ()) -> str:
+    """The expression in words, a short phrase first where there is one that says exactly the same, and last what its prefixes mean.
 
     >>> from queries.lpe.parser import parse
     >>> explain(parse("C D <TS>+ L").tree)
     'refractive caustic (the camera, then diffuse scattering, then specular transmission once or more, then a light)'
     """
     phrase = phrase_of(node)
-    return f"{phrase} ({describe(node)})" if phrase else describe(node)
+    said = f"{phrase} ({describe(node)})" if phrase else describe(node)
+    return "; ".join([said, *(_PREFIXES[prefix] for prefix in prefixes)])
 
 
 def describe(node: Node) -> str:
@@ -103,21 +112,29 @@ def describe_step(step: Step) -> str:
 def _listed(test: Test, words: dict[str, str]) -> str:
     if test.field == "type" and test.mode == "in" and test.names == frozenset("RTV"):
         return "any interaction"
-    listed = " or ".join(words.get(name, f"no such event ({name})") for name in sorted(test.names))
-    return f"anything but {listed}" if test.mode == "other" else listed
+    if test.mode == "other":
+        # letters of the other field exclude nothing
+        excluded = " or ".join(words[name] for name in sorted(test.names & words.keys()))
+        return f"anything but {excluded}" if excluded else "any"
+    return " or ".join(words.get(name, f"no such {'event' if test.field == 'type' else 'kind of'} ({name})") for name in sorted(test.names))
 
 
 def _label(test: Test) -> str:
     names = " or ".join(sorted(test.names))
-    place = "" if test.position is None else f" as its {_ordinal(test.position)} label"
+    if test.position is not None and test.mode == "in":
+        return f"whose {ordinal(test.position)} label is {names}"
     if test.mode == "in":
-        return f"at {names}{place}"
+        return f"labeled {names}"
     if test.mode == "without":
-        return f"not at {names}{place}"
-    return f"at something named but not {names}{place}" if names else f"at something named{place}"
+        return f"not labeled {names}"
+    label = "a label" if test.position is None else f"a {ordinal(test.position)} label"
+    if not names:
+        return f"with {label}"
+    return f"with {label}, but not {names}" if test.position is None else f"with {label} other than {names}"
 
 
-def _ordinal(position: int) -> str:
+def ordinal(position: int) -> str:
+    """The place of a label, from 0, in words."""
     return _ORDINALS[position] if position < len(_ORDINALS) else f"{position + 1}th"
 
 

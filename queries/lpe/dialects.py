@@ -6,13 +6,14 @@ from dataclasses import replace
 from queries.errors import ExpressionError
 from queries.lpe import parser
 from queries.lpe.automaton import Automaton, automaton, matches_some_path
+from queries.lpe.describe import describe, ordinal
 from queries.lpe.dfa import combine
 from queries.lpe.direction import camera_first
 from queries.lpe.limits import Work
 from queries.lpe.parser import Parsed
 from queries.lpe.prefixes import read_prefixes
 from queries.lpe.printer import show
-from queries.lpe.syntax import Node, steps_of
+from queries.lpe.syntax import Combination, Node, Repeat, Step, step, steps_of
 
 DIALECTS = ("std", "osl", "thesis")
 _COMPARED = 200_000  # steps of work that a comparison of two readings may take
@@ -28,6 +29,7 @@ def read(text: str, dialect: str, objects: Collection[str] | None, regions: Coll
 
         # Prefixes are no part of OSL's notation: they are read here, before it.
         prefixes, start = read_prefixes(text)
+        start = len(text) - len(text[start:].lstrip()) if prefixes else start
         try:
             return replace(osl.parse(text[start:]), prefixes=prefixes)
         except ExpressionError as error:
@@ -56,7 +58,27 @@ def osl_reading(text: str, tree: Node) -> str | None:
             return None
     except ExpressionError:
         return None
+    label = _label_by_place(other) if _without_places(other) == tree else None
+    if label:
+        return f"OSL reads labels by place, {label}; here they may stand in any place: say `dialect: osl` if you mean OSL's reading"
     return f"OSL reads this text as {_shown(other, 'osl')}; it is read here as {_shown(tree, 'std')}: say `dialect: osl` if you mean OSL's reading"
+
+
+def _label_by_place(tree: Node) -> str | None:
+    """The first label that a tree looks for in one place of an event's list."""
+    placed = [test for one in steps_of(tree) for test in one.tests if test.position is not None and test.names]
+    return f"'{min(placed[0].names)}' as an event's {ordinal(placed[0].position or 0)} label" if placed else None
+
+
+def _without_places(node: Node) -> Node:
+    """The tree with its labels in any place."""
+    if isinstance(node, Step):
+        return step(*(replace(test, position=None) for test in node.tests))
+    if isinstance(node, Repeat):
+        return replace(node, part=_without_places(node.part))
+    if isinstance(node, Combination):  # OSL has none
+        return node
+    return replace(node, parts=tuple(_without_places(part) for part in node.parts))
 
 
 def _differ(a: Node, b: Node) -> bool:
@@ -72,6 +94,4 @@ def _shown(tree: Node, source: str) -> str:
     try:
         return f"`{show(tree, 'std', source)}`"
     except ExpressionError:
-        from queries.lpe.describe import describe
-
         return describe(tree)

@@ -84,7 +84,7 @@ def _effect(words: str, shape: str) -> Effect:
 
 
 EFFECTS = (
-    _effect("{source} itself", ""),
+    _effect("{source} seen directly", ""),
     _effect("{source} seen through {a}", "TS@a+"),
     _effect("mirror reflection of {source}", "RS+"),
     _effect("mirror reflection of {source} in {a}", "RS@a+"),

@@ -1,20 +1,25 @@
 """The names that a run knows, and what was probably meant by one that it does not."""
 
 import difflib
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from queries.errors import ExpressionError
 
 OBJECT_FIELDS = ("object", "material", "light", "blocker")
 REGION_FIELDS = ("region", "crosses")
+_SERVES = {"object": ("object",), "blocker": ("object",), "material": ("material",), "light": ("light", "object")}  # kinds that a field may name
+_ARTICLE = {"object": "an", "material": "a", "light": "a"}
 _COMPARED = 500  # names that are looked through for the nearest one
 _LONGEST = 60  # characters of a name that is worth comparing
 
 
 @dataclass(frozen=True)
 class Known:
-    """``objects``: the names of objects, materials and lights; ``regions``: of regions. None where they are not known: any name will do."""
+    """``objects``: the names of objects, materials and lights; ``regions``: of regions. None where they are not known: any name will do.
+
+    ``objects`` may map each name to what it names, any of ``object``, ``material`` and ``light``.
+    """
 
     objects: Collection[str] | None = None
     regions: Collection[str] | None = None
@@ -22,7 +27,10 @@ class Known:
     def check(self, field: str, name: str, column: int) -> None:
         """Raise ``ExpressionError`` where a test of ``field`` (``object``, ``region`` ...) names something that does not exist."""
         names = self.objects if field in OBJECT_FIELDS else self.regions if field in REGION_FIELDS else None
-        if names is None or name in names:
+        if names is None:
+            return
+        if name in names:
+            self._check_kind(field, name, column)
             return
         if field in OBJECT_FIELDS:
             raise ExpressionError(f"no object, material or light is named `{_short(name)}`{nearest(name, names)}", column)
@@ -33,6 +41,18 @@ class Known:
         else:
             hint = nearest(name, names) if names else ": no region is defined"
         raise ExpressionError(f"no region is named `{_short(name)}`{hint}", column)
+
+    def kinds(self, name: str) -> frozenset[str]:
+        """What a name names; nothing where that is not known."""
+        found = self.objects.get(name) if isinstance(self.objects, Mapping) else None
+        return frozenset(found) & {"object", "material", "light"} if isinstance(found, Collection) else frozenset()
+
+    def _check_kind(self, field: str, name: str, column: int) -> None:
+        kinds = self.kinds(name) if field in OBJECT_FIELDS else frozenset()
+        if kinds and kinds.isdisjoint(_SERVES[field]):
+            wanted, found = _SERVES[field][0], sorted(kinds)[0]
+            said = f"`{_short(name)}` is no {wanted} but {_ARTICLE[found]} {found}"
+            raise ExpressionError(f"{said}: say `@{found}:{_short(name)}` (in the notation `std`)", column)
 
 
 def nearest(name: str, names: Collection[str]) -> str:

@@ -5,7 +5,7 @@
     expression := path { "|" path }
     path       := "(" expression ")" | source item* "E"
     source     := emitter | "(" emitter { "|" emitter } ")"
-    item       := atom [ "*" | "+" | "?" | "{n}" | "{n,}" | "{,m}" | "{n,m}" ]      ("^*" is "*", as it is typeset)
+    item       := atom [ "*" | "+" | "?" | "{n}" | "{n,}" | "{,m}" | "{n,m}" ]      ("^*" and "^{*}" are "*", as it is typeset)
     atom       := scatterer | "(" item+ { "|" item+ } ")"
     emitter    := ( "L" | "O" | "B" ) subscript*
     scatterer  := ( "D" | "G" | "S" | "X" ) ( "^R" | "^T" | subscript )* | "V" subscript*
@@ -24,6 +24,7 @@ from collections.abc import Collection
 
 from queries.errors import ExpressionError
 from queries.lpe.limits import MAX_NESTING, MAX_REPEAT
+from queries.lpe.names import Known
 from queries.lpe.parser import Parsed
 from queries.lpe.prefixes import read_prefixes
 from queries.lpe.syntax import EMITTER_TYPES, Node, Repeat, Step, Test, choice, sequence, step
@@ -60,6 +61,7 @@ class _Parser:
     def __init__(self, tokens: list[ThesisToken], objects: Collection[str] | None, regions: Collection[str] | None) -> None:
         self.tokens = tokens
         self.objects = None if objects is None else frozenset(objects)
+        self.known = Known(objects)
         self.regions = None if regions is None else frozenset(regions)
         self.at = 0
         self.nesting = 0
@@ -215,6 +217,8 @@ class _Parser:
         if is_object and is_region:
             raise ExpressionError(f"{wanted}, which is both: rename the region", name.column)
         if is_object or is_region:
+            if is_object:
+                self.known.check(kind, name.text, name.column)
             return Test(kind if is_object else "region", frozenset({name.text}))
         if self.objects is not None and self.regions is not None:
             raise ExpressionError(f"{wanted}, which is neither{self.nearest(name)}", name.column)

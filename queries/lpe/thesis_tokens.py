@@ -1,5 +1,6 @@
 """Text in the thesis's notation to tokens: symbols carry their superscripts and subscripts, so the parser sees one token for ``S_j^T``."""
 
+import re
 from dataclasses import dataclass
 
 from queries.errors import ExpressionError
@@ -8,6 +9,7 @@ from queries.lpe.tokens import END
 SYMBOLS = "LOBDGSVXE"
 WANTED = "a symbol (L O B first, then D G S V X, last E) or `(`"
 _PUNCTUATION = "()|*+?"
+_RAISED = re.compile(r"\^\s*(?:([*+?])|\{\s*([*+?])\s*\})")  # a repetition as it is typeset
 
 
 @dataclass(frozen=True)
@@ -150,16 +152,18 @@ class _Reader:
         return "".join(inside)
 
     def repeats(self) -> bool:
-        """Whether the `^` here raises a repetition, as typeset in `(D|G|S)^*`, and no superscript."""
-        return self.text[self.at + 1 :].lstrip()[:1] in ("*", "+", "?")
+        """Whether the `^` here raises a repetition, as typeset in `(D|G|S)^*` and `(D|G|S)^{*}`, and no superscript."""
+        return _RAISED.match(self.text, self.at) is not None
 
     def typeset_repetition(self, column: int) -> ThesisToken:
         """The repetition that a `^` raises."""
-        self.at += 1
-        mark = self.peek()
-        if mark not in ("*", "+", "?"):
-            raise ExpressionError(f"expected `^R` or `^T` after a symbol, or a raised repetition such as `^*`, found `^` and {_shown(mark)}", column)
-        self.at += 1
+        found = _RAISED.match(self.text, self.at)
+        if found is None:
+            self.at += 1
+            wanted = "`^R` or `^T` after a symbol, or a raised repetition such as `^*`"
+            raise ExpressionError(f"expected {wanted}, found `^` and {_shown(self.peek())}", column)
+        self.at = found.end()
+        mark = found[1] or found[2]
         return ThesisToken(mark, mark, column)
 
 

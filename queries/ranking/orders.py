@@ -2,9 +2,9 @@
 
 - contribution: flux in the region, descending.
 - discrimination: how special a class is to the region: the lower confidence bound (95 %, one-sided) of its share of the flux inside over
-  its share of the flux in the surrounding ring, descending. Classes of too few walks inside come last. Few walks in the ring say little of its
-  flux there, and none say nothing of its error: below 30 walks, an upper bound stands for that flux, namely Poisson's for the number of walks
-  (3 for none: the rule of three) times the mean flux of the class's walks.
+  its share of the flux in the surrounding ring, descending. Classes of too few walks inside come last, those of a single one last of all. Few
+  walks in the ring say little of its flux there, and none say nothing of its error: below 30 walks, an upper bound stands for that flux, namely
+  Poisson's for the number of walks (3 for none: the rule of three) times the mean flux of the class's walks.
 - ratio: the class's flux in the region over that in the outer region (region and ring), descending.
 - literal: outer over inner, descending, as the thesis's text has it; this puts the least special class first.
 """
@@ -19,6 +19,7 @@ from queries.ranking.histograms import Histogram
 from queries.statistics import Estimate, Units
 
 F64 = npt.NDArray[np.float64]
+I64 = npt.NDArray[np.int64]
 ORDERS = ("contribution", "discrimination", "ratio", "literal")
 LEVEL = 0.95  # of one-sided bounds
 RING_SUPPORT = 30.0  # walks in the ring from which its flux is taken as found
@@ -63,7 +64,7 @@ def bounded_ring(units: Units, inside: Histogram, ring: Histogram) -> F64:
 
 
 def order_key(by: str, units: Units, flux: Estimate, comparison: Comparison | None) -> F64:
-    """What classes are sorted by, descending: float64 (classes); -inf where it is not known. Supported classes come before others."""
+    """What classes of one tier are sorted by, descending: float64 (classes); -inf where it is not known."""
     if comparison is None:
         return flux.value
     key = comparison.ratio.value
@@ -72,6 +73,13 @@ def order_key(by: str, units: Units, flux: Estimate, comparison: Comparison | No
         key = comparison.ratio.value if units.reason else comparison.lower
         key = np.where(np.isnan(key) & bool(units.reason), np.inf, key)  # nothing in the ring: infinitely special, for all that is known
     return np.where(np.isnan(key), -np.inf, key)
+
+
+def tiers(inside: Histogram, comparison: Comparison | None) -> I64:
+    """What classes are sorted by before all else, ascending: int64 (classes). 0: supported; 1: not; 2: not, and seen once."""
+    if comparison is None:
+        return np.zeros(len(inside.sums), np.int64)
+    return np.where(comparison.supported, 0, np.where(inside.moments.walks > 1, 1, 2))
 
 
 def _ratio_of_shares(inside: F64, whole_inside: F64, ring: F64, whole_ring: F64) -> F64:

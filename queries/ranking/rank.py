@@ -11,7 +11,7 @@ from queries.classes import PathClasses
 from queries.errors import QueryError
 from queries.ranking.histograms import Histogram, histograms
 from queries.ranking.labels import ClassLabels, DescriptorLabels, Label, Labels, selection
-from queries.ranking.orders import ORDERS, Comparison, compare, order_key
+from queries.ranking.orders import ORDERS, Comparison, compare, order_key, tiers
 from queries.ranking.places import Places
 from queries.regions import Region
 from queries.run import Run
@@ -45,11 +45,12 @@ def rank(
     Flux is the luminance of contributions, summed over the image's pixels. Errors are standard errors over the estimator's independent units
     (``queries.statistics``). Null stands for what cannot be known. Equal figures are ordered by flux, then by expression.
 
-    Columns: ``rank``, ``expression`` (selects the class), ``description``, ``descriptor``, ``flux``, ``share`` (of the region's flux),
-    ``cumulative`` (share, down to this rank), ``samples`` (paths), ``walks`` (with such paths), ``effective`` (walks of equal value that would
-    have the same relative variance), ``trusted`` and ``verdict`` (why errors cannot be trusted, null where they can). With a named region,
-    ``selection`` selects the class's paths there. Comparisons have ``outer_flux``, ``ring_share``, ``ring_walks`` and ``ratio``, and
-    discrimination has ``lower`` (the bound that it ranks by) and ``supported``. Each estimate ``x`` has its standard error ``x_error`` beside it.
+    Columns: ``rank``, ``description``, ``descriptor``, ``flux``, ``share`` (of the region's flux), ``cumulative`` (share, down to this rank),
+    ``paths`` (rows), ``samples`` (walks that have such paths), ``effective_samples`` (walks of equal value that would have the same relative
+    variance), ``units`` (that errors rest on), ``trusted`` and ``verdict`` (why errors cannot be trusted, null where they can), ``expression``
+    (selects the class) and, with a named region, ``selection`` (selects the class's paths there). Comparisons have ``ratio``, ``ring_share``,
+    ``ring_samples``, ``ring_verdict`` (why the errors of ``ring_share`` and ``ratio`` cannot be trusted) and ``outer_flux``; discrimination has
+    ``lower`` (the bound that it ranks by) and ``supported``. Each estimate ``x`` has its standard error ``x_error`` beside it.
 
     Raises QueryError for unknown names and values, and where no path lies in the region, or none in the ring that it is compared with.
     """
@@ -74,10 +75,9 @@ def rank(
             raise QueryError(_nothing(inner, at, inside=False))
         comparison = compare(by, units, inside, ring_of_found, totals, minimum_support)
     key = order_key(by, units, flux, comparison)
-    order = _order(key, flux.value, comparison, lambda i: labels.label(int(found[i])).expression, top)
-    columns = _figures(units, inside, totals[0], flux, order)
-    if comparison is not None:
-        columns |= _compared(by, comparison, ring_of_found, order)
+    order = _order(key, flux.value, tiers(inside, comparison), lambda i: labels.label(int(found[i])).expression, top)
+    columns: dict[str, Any] = {} if comparison is None else _compared(by, comparison, ring_of_found, order)
+    columns |= _figures(units, inside, totals[0], flux, order)
     return _table(columns, labels, found[order[:top]], selection_of=(region, at) if isinstance(region, str) else None)
 
 
@@ -116,11 +116,10 @@ def _nothing(region: Region | None, at: str, inside: bool) -> str:
     return f"no recorded path {which} around the region, {region.describe()}: make `outer` larger, or rank by contribution, which compares nothing"
 
 
-def _order(key: F64, flux: F64, comparison: Comparison | None, expression: Callable[[int], str], top: int | None) -> I64:
+def _order(key: F64, flux: F64, tier: I64, expression: Callable[[int], str], top: int | None) -> I64:
     """All classes in their order. Expressions are spelled for ties alone, and only as far down as is listed."""
-    supported = np.ones(len(key), np.bool_) if comparison is None else comparison.supported
-    order = np.lexsort((-flux, -key, ~supported))
-    tied = np.logical_and.reduce([column[order[1:]] == column[order[:-1]] for column in (flux, key, supported)])
+    order = np.lexsort((-flux, -key, tier))
+    tied = np.logical_and.reduce([column[order[1:]] == column[order[:-1]] for column in (flux, key, tier)])
     starts = np.flatnonzero(np.concatenate([[True], ~tied]))
     for first, end in zip(starts, [*starts[1:], len(order)]):
         if end - first > 1 and (top is None or first < top):
@@ -138,9 +137,10 @@ def _figures(units: Units, inside: Histogram, total: F64, flux: Estimate, order:
     return columns | {
         "cumulative": cumulative.value,
         "cumulative_error": cumulative.error,
-        "samples": inside.moments.rows[order].astype(np.int64),
-        "walks": inside.moments.walks[order].astype(np.int64),
-        "effective": effective_samples(inside.moments)[order],
+        "paths": inside.moments.rows[order].astype(np.int64),
+        "samples": inside.moments.walks[order].astype(np.int64),
+        "effective_samples": effective_samples(inside.moments)[order],
+        "units": np.full(len(order), units.count),
         "trusted": np.array([reasons[i] is None for i in order], np.bool_),
         "verdict": pa.array([reasons[i] for i in order], pa.string()),
     }
@@ -152,7 +152,9 @@ def _compared(by: str, comparison: Comparison, ring: Histogram, order: I64) -> d
     if by == "discrimination":
         columns |= {"lower": comparison.lower[order], "supported": comparison.supported[order]}
     columns |= _estimate("ring_share", comparison.ring_share, order)
-    columns |= {"ring_walks": ring.moments.walks[order].astype(np.int64)}
+    reasons = verdicts(ring.moments)
+    columns |= {"ring_samples": ring.moments.walks[order].astype(np.int64)}
+    columns |= {"ring_verdict": pa.array([reasons[i] or None for i in order], pa.string())}
     return columns | _estimate("outer_flux", comparison.outer, order)
 
 
@@ -161,13 +163,15 @@ def _estimate(name: str, estimate: Estimate, order: I64) -> dict[str, Any]:
 
 
 def _table(columns: dict[str, Any], labels: Labels, classes: I64, selection_of: tuple[str, str] | None) -> pa.Table:
-    """The first ranks as a table; NaN and infinities are null."""
-    found = [labels.label(int(number)) for number in classes]
-    named: dict[str, Any] = {"rank": np.arange(1, len(found) + 1)}
-    named |= {name: [label[k] for label in found] for k, name in enumerate(Label._fields)}
+    """The first ranks as a table; NaN and infinities are null. What is to be copied, and may be long, comes last."""
+    found: list[Label] = [labels.label(int(number)) for number in classes]
+    table: dict[str, Any] = {"rank": np.arange(1, len(found) + 1)}
+    table |= {"description": [label.description for label in found], "descriptor": [label.descriptor for label in found]}
+    table |= {name: _column(values, len(found)) for name, values in columns.items()}
+    table["expression"] = [label.expression for label in found]
     if selection_of is not None:
-        columns |= {"selection": [selection(label.expression, *selection_of) for label in found]}
-    return pa.table(named | {name: _column(values, len(found)) for name, values in columns.items()})
+        table["selection"] = [selection(label.expression, *selection_of) for label in found]
+    return pa.table(table)
 
 
 def _column(values: Any, count: int) -> pa.Array:

@@ -10,7 +10,7 @@ import pytest
 from tiny_job import write_job
 from typer.testing import CliRunner
 
-from pipeline.bench import contenders, main
+from pipeline.bench import contenders, main, questions
 from pipeline.bench.config import load_benchmark
 from pipeline.bench.contenders import Contenders, NotAvailable
 from pipeline.bench.diffuse_alone import REPLACED
@@ -68,6 +68,7 @@ def test_settings_change_the_file() -> None:
         ("rounds: 0", "`rounds`"),
         ("job: nowhere.yaml", "there is no job file"),
         ("out: [", "not valid YAML"),
+        ("questions: {ask: [{what: a, most_seconds: 1}]}", "expected either `expression` or `rank`"),
     ],
 )
 def test_bad_files_are_explained(tmp_path: pathlib.Path, more: str, message: str) -> None:
@@ -212,6 +213,42 @@ def test_without_mitsuba_the_rows_say_so(tmp_path: pathlib.Path, monkeypatch: py
     for chart in ("error.png", "rates.png"):
         assert (tmp_path / "out" / chart).read_bytes().startswith(b"\x89PNG")
     assert sorted(os.listdir(tmp_path / "out")) == ["error.png", "logs", "rates.png", "results.json", "results.md"]
+
+
+QUESTIONS = """
+sections: [questions]
+contenders: []
+questions:
+  regex: "C.D(..)*L"
+  memory_samples: 8
+  ask:
+    - {what: direct, expression: "C D .* L", most_seconds: 100}
+    - {what: around, expression: "C X* X@near X* L", most_seconds: 1.0e-9}
+    - {what: ranking, rank: {region: near}, most_seconds: 100}
+"""
+
+
+def test_questions_are_asked_of_a_recorded_run(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(questions, "AGAIN", ("mitsuba_scalar",))
+    path = write_benchmark(tmp_path, QUESTIONS)
+    settings = ["settings.regions.near={sphere: {center: [0, 0, 0], radius: 0.9}}"]
+    assert main(path, tmp_path / "out", settings) == 0
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    rows = {row["what"]: row for row in found["rows"]}
+    assert [rows[what]["passed"] for what in ("direct", "around", "ranking")] == [True, False, True]
+    figures = found["sections"]["questions"]
+    assert set(figures["wall_seconds"]) == {"direct", "around", "ranking", questions.REGEX, "rendering again (Mitsuba scalar)"}
+    assert all(len(walls) == 2 for walls in figures["wall_seconds"].values())
+    assert figures["answers"]["direct"]["answer"] > figures["answers"]["around"]["answer"] > 0
+    assert figures["answers"]["ranking"]["answer"] > 2
+    assert set(figures["peak_bytes"]) == {"direct", "around", "ranking"}
+    assert (tmp_path / "out" / "questions.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_regular_expression_that_asks_something_else_is_refused(tmp_path: pathlib.Path) -> None:
+    path = write_benchmark(tmp_path, QUESTIONS.replace("C.D(..)*L", "C.D(..)+L"))
+    with pytest.raises(JobError, match="not the same question"):
+        main(path, tmp_path / "out", ["settings.regions.near={sphere: {center: [0, 0, 0], radius: 0.9}}"])
 
 
 def test_the_command_explains_a_bad_file(tmp_path: pathlib.Path) -> None:

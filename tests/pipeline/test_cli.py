@@ -91,6 +91,37 @@ def test_lpe_writes_an_image(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> 
     assert read_exr(tmp_path / "direct.exr").max() > 0
 
 
+NEAR = ("--define", "near={sphere: {center: [0, 0.4, 0], radius: 1}}")
+
+
+def test_lpe_in_another_dialect_and_of_a_defined_region(tiny_run: pathlib.Path) -> None:
+    expected = pathspace("lpe", tiny_run, "C D L")
+    osl = pathspace("lpe", tiny_run, "CDL", "--dialect", "osl")
+    assert osl.exit_code == 0, osl.output
+    assert osl.stdout.splitlines()[1:] == expected.stdout.splitlines()[1:]
+    near = pathspace("lpe", tiny_run, "C X@near L", *NEAR)
+    assert near.exit_code == 0, near.output
+    count = pathspace("sql", tiny_run, "SELECT count(*) FROM lpe('C X@near L')", "--format", "csv", *NEAR)
+    assert count.exit_code == 0, count.output
+    assert int(count.stdout.splitlines()[1]) > 0
+    assert f"{int(count.stdout.splitlines()[1]):,} of" in near.stdout
+
+
+def test_rank_of_a_defined_region(tiny_run: pathlib.Path) -> None:
+    result = pathspace("rank", tiny_run, "--region", "near", "--by", "discrimination", "--format", "json", *NEAR)
+    assert result.exit_code == 0, result.output
+    classes = json.loads(result.stdout)
+    assert len(classes) > 1
+    one = pathspace("rank", tiny_run, "--region", "near", "--top", 1, "--format", "json", *NEAR)
+    assert len(json.loads(one.stdout)) == 1
+
+
+def test_diagnose(tiny_run: pathlib.Path) -> None:
+    result = pathspace("diagnose", tiny_run, "depths")
+    assert result.exit_code == 0, result.output
+    assert "depths" in result.stdout
+
+
 def test_export(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
     result = pathspace("export", tiny_run, "--parquet", tmp_path / "parquet")
     assert result.exit_code == 0, result.output
@@ -106,6 +137,13 @@ def test_export(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
         (["sql", "nowhere", "SELECT 1"], "nowhere"),
         (["info", "nowhere"], "not a run folder"),
         (["lpe", "RUN", "C (L"], "column"),
+        (["lpe", "RUN", "C X@near L", "--define", "near"], "near"),
+        (["lpe", "RUN", "C X@near L", "--define", "near={sphere: {center: [0, 0, .nan], radius: 1}}"], "center"),
+        (["lpe", "RUN", "C X@near L", "--define", "near={object: nothing}"], "no object"),
+        (["sql", "RUN", "SELECT * FROM lpe('C (L')"], "column"),
+        (["rank", "RUN", "--region", "nowhere"], "nowhere"),
+        (["rank", "RUN", "--by", "discrimination"], "region"),
+        (["diagnose", "RUN", "nothing"], "nothing"),
         (["lpe", "RUN", "C L", "--out", "a.jpeg"], "ends in .exr or .png"),
         (["export", "nowhere", "--parquet", "x"], "nowhere"),
         (["run", "nowhere.yaml"], "no such job file"),

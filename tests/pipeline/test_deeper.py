@@ -113,7 +113,7 @@ def test_the_estimate_agrees_with_a_deeper_render(folder: pathlib.Path, tmp_path
     with open_run(render(tmp_path, method, seed=99, max_depth=deep)) as other:
         deeper = pass_means(other)
         beyond = convergence(other, "C <[RT].>{3,} [LOB]").to_pylist()[-1]  # four segments or more, by itself
-    assert line["trust"] is None
+    assert line["verdict"] is None
     assert line["energy"] == pytest.approx(shallow.mean())
     assert (line["ended"] == line["replayed"]) == (most > line["ended"])
     assert line["replayed"] == pytest.approx(min(most, line["ended"]), abs=5 * most**0.5)
@@ -166,7 +166,7 @@ def test_nothing_is_cut_where_no_walk_reached_the_limit(tmp_path: pathlib.Path) 
     with open_run(render(tmp_path, "path", max_depth=200, rr_depth=2, samples=4)) as run:
         (line,) = cut(run).to_pylist()
     assert (line["ended"], line["cut"], line["standard_error"]) == (0, 0.0, None)
-    assert "no recorded walk" in line["trust"]
+    assert "no recorded walk" in line["verdict"]
 
 
 def test_a_limit_that_cannot_be_raised_is_said(folder: pathlib.Path) -> None:
@@ -179,14 +179,14 @@ def test_a_limit_that_cannot_be_raised_is_said(folder: pathlib.Path) -> None:
         run.manifest["settings"]["max_depth"] = 255
         (line,) = cut(run).to_pylist()
         assert (line["cut"], line["share"], line["replayed"]) == (None, None, 0)
-        assert "the most that can be traced" in line["trust"]
+        assert "the most that can be traced" in line["verdict"]
 
 
 def test_few_walks_are_distrusted(folder: pathlib.Path) -> None:
     with open_run(folder) as run:
         (line,) = cut(run, most=15, traced_to=12).to_pylist()
     assert 0 < line["replayed"] < 60
-    assert line["trust"]
+    assert line["verdict"]
     assert line["standard_error"] is line["share_error"] is None
 
 

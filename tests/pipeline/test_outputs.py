@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tiny_job import SCENE, SHARDS, write_job
 
+from pipeline import rankings
 from pipeline.catalogues import merged_words
+from pipeline.config import Rank
 from pipeline.errors import RunFolderError
 from pipeline.film_sum import lit_rows
 from pipeline.images import read_exr, tone_map, write_exr, write_layers, write_png
@@ -20,7 +22,7 @@ from pipeline.prepare import prepare_job
 from pipeline.run_folder import RunFolder
 from pipeline.shards import LARGEST, SMALLEST, plan_shards
 from pipeline.stages import run_job
-from queries import open_run
+from queries import Run, open_run
 from renderer.film import Film
 from renderer.tables import CAMERA_ROOT, EVENTS, TECHNIQUES, WORDS
 from renderer.trace import Tracer
@@ -241,6 +243,45 @@ def test_aovs_follow_the_regions_of_the_job(aov_run: pathlib.Path, tmp_path: pat
     run_job(write_job(tmp_path, aovs=near, regions=smaller), out=run, resume=True)
     after = read_exr(run / "images/near.exr")
     assert 0 < after.sum() < before.sum()
+
+
+FACES = "013 032 467 475 045 051 237 276 026 064 157 173"
+BOX = "OFF\n8 12 0\n" + "".join(f"{x} {y} {z}\n" for x in (-1, 1) for y in (0, 1) for z in (-1, 1)) + "".join(
+    f"3 {' '.join(face)}\n" for face in FACES.split()
+)  # fmt: skip
+
+
+def test_what_a_job_makes_follows_the_mesh_of_a_region(tmp_path: pathlib.Path) -> None:
+    (tmp_path / "box.off").write_text(BOX)
+    job = write_job(tmp_path, aovs={"near": "C X@box .* L"}, regions={"box": {"mesh": "box.off"}}, rank={"near": {"region": "box"}})
+    run = run_job(job, out=tmp_path / "run").path
+    made = [run / "images/near.exr", run / "rankings/near.csv"]
+    before = [file.read_bytes() for file in made]
+    times = [file.stat().st_mtime_ns for file in made]
+    run_job(job, out=run, resume=True)
+    assert [file.stat().st_mtime_ns for file in made] == times
+    (tmp_path / "box.off").write_text(BOX.replace("-1 0", "-0.2 0"))
+    run_job(job, out=run, resume=True)
+    assert all(file.read_bytes() != old for file, old in zip(made, before))
+
+
+def test_rankings_go_on_where_they_were_interrupted(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    job = write_job(tmp_path, regions=MIDDLE, rank={name: {"region": "middle", "top": top} for name, top in (("one", 1), ("two", 2))})
+    original = rankings.ranked
+
+    def interrupted(run: Run, asked: Rank, threads: int | None) -> pa.Table:
+        if asked.top == 2:
+            raise KeyboardInterrupt
+        return original(run, asked, threads)
+
+    monkeypatch.setattr(rankings, "ranked", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_job(job, out=tmp_path / "run")
+    monkeypatch.undo()
+    written = (tmp_path / "run/rankings/one.csv").stat().st_mtime_ns
+    run_job(job, out=tmp_path / "run", resume=True)
+    assert (tmp_path / "run/rankings/one.csv").stat().st_mtime_ns == written
+    assert (tmp_path / "run/rankings/two.csv").exists()
 
 
 def test_unoccluded_light_is_that_of_the_scene_without_the_blocker(tmp_path: pathlib.Path) -> None:

@@ -188,8 +188,9 @@ def _events(row: dict[str, Any], start: Point, chain: list[tuple[Letter, Point]]
     here: Point | None = end
     if INFINITE[row["emitter"]]:
         here = None
-        if technique in (EMITTER_HIT, EMITTER_SAMPLE):
-            end = tuple(a + 1000 * b for a, b in zip(at, end))  # type: ignore[assignment]
+        # Light walks keep a point on a disk outside the scene, which the ray to infinity passes
+        way = np.array(end) - (0 if technique in (EMITTER_HIT, EMITTER_SAMPLE) else np.array(at))
+        end = tuple((np.array(at) + 1000 * way / np.linalg.norm(way)).tolist())
     owner = OBJECTS[thing][0] if thing is not None else None
     events.append(PathEvent(symbol, None, tuple(filter(None, labels)), frozenset(facts | places(at, end, here, owner))))
     return tuple(events)

@@ -95,7 +95,7 @@ def test_places_and_techniques(runs: dict[str, PlacedRun], kind: str, text: str)
     assert 0 < check(runs[kind], text) < len(runs[kind].rows["paths"])
 
 
-@pytest.mark.parametrize("kind", ["path", "lens", "both"])
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("text", ["C .* .@crosses:far_ball", "C .* B@crosses:far_ball", "C .* B@!crosses:far_ball"])
 def test_rays_to_infinity(runs: dict[str, PlacedRun], kind: str, text: str) -> None:
     """The ball lies beyond all vertices: only light from infinitely far away crosses it."""

@@ -80,11 +80,11 @@ def assert_figures(line: dict[str, Any], rows: Rows, settings: dict[str, Any]) -
         if name in line:
             assert line[name] == pytest.approx(expected[name], rel=1e-6), name
     if distrusted(rows, settings):
-        assert line["trust"]
+        assert line["verdict"]
         assert line["standard_error"] is None
         assert all(line[name] is None for name in ("variance", "relative_error", "efficiency") if name in line)
     else:
-        assert line["trust"] is None
+        assert line["verdict"] is None
         assert line["standard_error"] == pytest.approx(expected["standard_error"], rel=1e-6)
         if "variance" in line:
             assert line["variance"] == pytest.approx(expected["standard_error"] ** 2, rel=1e-6)
@@ -105,16 +105,16 @@ def test_classes(run: SyntheticRun) -> None:
     expected = by_letters(run)
     assert len(found) == len(expected) > 20
     for number, line in enumerate(found):
-        letters = tuple((letter[0], letter[1:] or None) for letter in line["class"].replace("<", "").replace(">", "").split())
+        letters = tuple((letter[0], letter[1:] or None) for letter in line["expression"].replace("<", "").replace(">", "").split())
         if number < 8:
-            expression = compile(line["class"])
+            expression = compile(line["expression"])
             assert [key for key in expected if expression.accepts([(*event, ()) for event in key])] == [letters]
         assert_figures(line, expected[letters], settings)
         assert line["units"] == settings["passes"]
-        assert line["words"]
-        if line["trust"] is None:
+        assert line["description"]
+        if line["verdict"] is None:
             assert line["efficiency"] == pytest.approx(1 / (line["variance"] * 2.5))
-    assert {line["trust"] is None for line in found} == {True, False}
+    assert {line["verdict"] is None for line in found} == {True, False}
     assert [line["energy"] for line in found] == sorted((line["energy"] for line in found), reverse=True)
     assert sum(line["share"] for line in found) == pytest.approx(1.0)
 
@@ -123,17 +123,17 @@ def test_classes_of_objects_are_parts_of_those_without(run: SyntheticRun) -> Non
     with open_run(run.folder) as opened:
         coarse, fine = classes(opened).to_pylist(), classes(opened, with_objects=True, most=10**6).to_pylist()
         top = classes(opened, most=3).to_pylist()
-        named = [line for line in fine if "@light:" in line["class"] and "@object:" in line["class"]]
+        named = [line for line in fine if "@light:" in line["expression"] and "@object:" in line["expression"]]
         assert len(named) > 20
         for line in named[:4]:
-            selected = sum(int(chosen.sum()) for chosen in select_all(opened, opened.compile(line["class"])))
+            selected = sum(int(chosen.sum()) for chosen in select_all(opened, opened.compile(line["expression"])))
             assert selected == line["paths"] > 0
     assert len(fine) > len(coarse)
     for name in ("energy", "paths", "share"):
         by_class: dict[str, float] = collections.defaultdict(float)
         for line in fine:
-            by_class[NAMES.sub("", line["class"])] += line[name]
-        assert by_class == pytest.approx({line["class"]: line[name] for line in coarse}), name
+            by_class[NAMES.sub("", line["expression"])] += line[name]
+        assert by_class == pytest.approx({line["expression"]: line[name] for line in coarse}), name
     assert top == coarse[:3]
 
 
@@ -177,11 +177,11 @@ def test_a_heavy_tail_is_distrusted_instead_of_printed(tmp_path: pathlib.Path, a
     with open_run(run.folder) as opened:
         after = ask(opened).to_pylist()
     struck = max(after, key=lambda line: line["energy"])
-    key = next(name for name in ("class", "depth", "technique") if name in struck)
+    key = next(name for name in ("expression", "depth", "technique") if name in struck)
     was = next(line for line in before if line[key] == struck[key])
-    assert was["trust"] is None
+    assert was["verdict"] is None
     assert was["standard_error"] > 0
-    assert "one walk" in struck["trust"]
+    assert "one walk" in struck["verdict"]
     assert struck["standard_error"] is None
 
 

@@ -93,10 +93,10 @@ def test_planted_fireflies_are_found_with_their_provenance(planted: tuple[Synthe
             assert line["without"] < line["luminance"] / 4
             # the class is that of the path, and its expression selects it
             word = run.words[run.rows.index(row)]
-            assert compile(line["class"]).accepts([(event.type, event.scattering, event.labels) for event in word])
+            assert compile(line["expression"]).accepts([(event.type, event.scattering, event.labels) for event in word])
             names = [event.labels[0] for event in word[1:-1]]
             assert line["objects"] == ", ".join(names)
-            assert line["words"]
+            assert line["description"]
 
 
 def test_the_rule_is_the_documented_one(planted: tuple[SyntheticRun, list[dict[str, Any]]]) -> None:

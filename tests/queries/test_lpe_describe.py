@@ -2,6 +2,7 @@
 
 import pytest
 
+from queries.lpe import compile
 from queries.lpe.describe import describe, explain
 from queries.lpe.parser import parse
 from queries.lpe.syntax import NAMED_FIELDS, NUMBERED_FIELDS, Step, Test, step
@@ -9,8 +10,12 @@ from queries.lpe.thesis import parse as parse_thesis
 
 LONG = [
     ("CDL", "the camera, then diffuse scattering, then a light"),
+    ("C<RD!'a'>L", "the camera, then diffuse reflection not labeled a, then a light"),
+    ("C<RD[^'a']>L", "the camera, then diffuse reflection with a label, but not a, then a light"),
+    ("C[^RD]L", "the camera, then anything but diffuse scattering, then a light"),
+    ("C<D>L", "the camera, then no such event (D), then a light"),
     ("CXL", "the camera, then any interaction, then a light"),
-    ("C<RD'floor'>+B", "the camera, then diffuse reflection at floor once or more, then the background"),
+    ("C<RD'floor'>+B", "the camera, then diffuse reflection labeled floor once or more, then the background"),
     ("C<Vx>L", "the camera, then volume scattering without a scattering type, then a light"),
     ("CD@object:floor@p L", "the camera, then diffuse scattering on floor in p, then a light"),
     ("CX@!p@material:white L@light:lamp", "the camera, then any interaction of material white not in p, then a light named lamp"),
@@ -39,9 +44,9 @@ def test_every_field_has_words(field: str, mode: str) -> None:
 @pytest.mark.parametrize(
     ("mode", "names", "words"),
     [
-        ("in", ["coat"], "any event at coat as its second label"),
-        ("other", ["coat"], "any event at something named but not coat as its second label"),
-        ("other", [], "any event at something named as its second label"),
+        ("in", ["coat"], "any event whose second label is coat"),
+        ("other", ["coat"], "any event with a second label other than coat"),
+        ("other", [], "any event with a second label"),
     ],
 )
 def test_labels_by_position(mode: str, names: list[str], words: str) -> None:
@@ -56,6 +61,21 @@ def test_the_short_phrase_comes_first() -> None:
     assert explain(parse_thesis("L_i S_j^T S_j^T X_p E").tree).startswith(
         "caustic through j twice onto any surface from i seen in p (a light named i, then"
     )
+
+
+@pytest.mark.parametrize(
+    ("prefixes", "words"),
+    [
+        ("unoccluded;", "as if nothing cast a shadow"),
+        ("shadows;", "blocked connections alone, the light that is missing in shadows"),
+        ("noclamp; nothruput;", "without clamping; without the walk's throughput up to the last interaction"),
+    ],
+)
+@pytest.mark.parametrize("dialect", ["std", "osl", "thesis"])
+def test_prefixes_are_said_last(prefixes: str, words: str, dialect: str) -> None:
+    text = "LDE" if dialect == "thesis" else "CDL"
+    expression = compile(f"{prefixes} {text}", dialect)  # a space before the expression, in OSL's notation too
+    assert expression.describe() == f"{compile(text, dialect).describe()}; {words}"
 
 
 @pytest.mark.parametrize("text", ["CD'left_wall'L", "CDL & CSL", "C D? L", "C <RD> L", "L L", "D"])

@@ -10,17 +10,17 @@ from words import word
 from queries.errors import ExpressionError
 from queries.lpe import compile, osl, parser
 
-DIFFER = [  # text, OSL's reading, ours, a path that one of them alone matches
+DIFFER = [  # text, what is said of OSL's reading, of ours, a path that one of them alone matches
     ("CDL|CSL", "`CD[CL]SL`", "`CDL|CSL`", "C RD L"),
     ("CD|(SD)L", "`C(D|SD)L`", "`CD|SDL`", "C RD L"),
     ("CL|C.B", "`C[CL].B`", "`CL|C.B`", "C L"),
-    ("C'a'L", "the camera, then any event at a as its first label", "`C'a'L`", "C RD:b:a L"),
-    ("C<RD'a''b'>L", "the camera, then diffuse reflection at a as its first label at b as its second label", "`C<RD'a''b'>L`", "C RD:b:a L"),
-    ("C<RD.'b'>L", "the camera, then diffuse reflection at b as its second label", "`C<RD'b'.>L`", "C RD:b L"),
-    ("C[^'a']L", "the camera, then any event at something named but not a as its first label", "`C[^'a']L`", "C RD:b:a L"),
+    ("C'a'L", "OSL reads labels by place, 'a' as an event's first label", "here they may stand in any place", "C RD:b:a L"),
+    ("C<RD'a''b'>L", "labels by place, 'a' as an event's first", "in any place", "C RD:b:a L"),
+    ("C<RD.'b'>L", "as the camera, then diffuse reflection whose second label is b", "`C<RD'b'.>L`", "C RD:b L"),
+    ("C[^'a']L", "labels by place, 'a' as an event's first", "in any place", "C RD:b:a L"),
     (
         "C.*<RD..>L",
-        "the camera, then any event any number of times, then diffuse reflection at something named as its second label",
+        "the camera, then any event any number of times, then diffuse reflection with a second label",
         "`C.*<RD.>L`",
         "C RD:a L",
     ),
@@ -37,8 +37,9 @@ def said(text: str) -> list[str]:
 def test_a_difference_is_told_with_both_readings(text: str, theirs: str, ours: str, path: str) -> None:
     assert compile(text).accepts(word(path)) != compile(text, dialect="osl").accepts(word(path))
     [warning] = said(text)
-    assert f"OSL reads this text as {theirs}" in warning
-    assert f"read here as {ours}" in warning
+    assert theirs in warning
+    assert ours in warning
+    assert len(warning) < 220
 
 
 @pytest.mark.parametrize(

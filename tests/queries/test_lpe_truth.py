@@ -1,5 +1,8 @@
 """The standard dialect as a truth table of expressions and paths. A row is an expression, the paths it matches, and those it does not."""
 
+import contextlib
+import time
+
 import pytest
 from words import word
 
@@ -193,8 +196,8 @@ def test_no_warning_without_cause(text: str) -> None:
     [
         ("CDL", "direct light (the camera, then diffuse scattering, then a light)"),
         ("C<TS>{2}L", "the camera, then specular transmission 2 times, then a light"),
-        ("C<RD'floor'>+B", "the camera, then diffuse reflection at floor once or more, then the background"),
-        ("CDL - C!'a'L", "(the camera, then diffuse scattering, then a light) but not (the camera, then any event not at a, then a light)"),
+        ("C<RD'floor'>+B", "the camera, then diffuse reflection labeled floor once or more, then the background"),
+        ("CDL - C!'a'L", "(the camera, then diffuse scattering, then a light) but not (the camera, then any event not labeled a, then a light)"),
     ],
 )
 def test_descriptions(text: str, words: str) -> None:
@@ -204,6 +207,22 @@ def test_descriptions(text: str, words: str) -> None:
 def test_unknown_dialect() -> None:
     with pytest.raises(ExpressionError, match="expected one of the dialects std, osl, thesis"):
         compile("CDL", dialect="vray")
+
+
+@pytest.mark.parametrize("labels", [["a", "b"], ("b", "a"), {"a", "b"}, frozenset("ab"), {"a": 1, "b": 2}])
+@pytest.mark.parametrize("dialect", ["std", "osl"])
+def test_labels_of_any_collection(labels: object, dialect: str) -> None:
+    assert compile("C<RD[^'c']>L", dialect).accepts([("C", None, None), ["R", "D", labels], ("L", None, None)])
+
+
+@pytest.mark.parametrize("operator", "&-^|")
+def test_thousands_of_operands_are_read_or_refused_at_once(operator: str) -> None:
+    start = time.process_time()
+    with contextlib.suppress(ExpressionError):
+        compile(operator.join(["C.*L"] * 3000))
+    with contextlib.suppress(ExpressionError):
+        compile(operator.join("C" + "." * count + "L" for count in range(190)))
+    assert time.process_time() - start < 4
 
 
 @pytest.mark.parametrize("events", ["CDL", [("C",), "D"], [("R", "D", "floor")], [(1, None, ())], [()]])

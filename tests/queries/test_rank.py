@@ -99,7 +99,8 @@ class Expected:
         walks, ring_walks = self.samples["inside"][kind], self.samples["ring"].get(kind, {})
         x = [sum(values) for values in walks.values()]
         scale = 1 / (self.settings["keep"] * self.settings["passes"])
-        found = {"samples": sum(map(len, walks.values())), "walks": len(walks), "effective": sum(x) ** 2 / sum(v * v for v in x)}
+        found: dict[str, Any] = {"paths": sum(map(len, walks.values())), "samples": len(walks), "units": self.units.count}
+        found["effective_samples"] = sum(x) ** 2 / sum(v * v for v in x)
         found["flux"], found["flux_error"] = self.jackknife(lambda s: s * scale, inside)
         found["share"], found["share_error"] = self.jackknife(lambda a, b: a / b, inside, self.total["inside"])
         found["trusted"] = max(x) ** 2 <= 0.1 * sum(v * v for v in x) and sum(v**2 for v in x) ** 2 >= 20 * sum(v**4 for v in x)
@@ -109,7 +110,7 @@ class Expected:
         outer = [a + b for a, b in zip(inside, ring)]
         found["outer_flux"], found["outer_flux_error"] = self.jackknife(lambda s: s * scale, outer)
         found["ring_share"], found["ring_share_error"] = self.jackknife(lambda a, b: a / b, ring, self.total["ring"])
-        found["ring_walks"] = len(ring_walks)
+        found["ring_samples"] = len(ring_walks)
         if by in ("ratio", "literal"):
             top, bottom = (inside, outer) if by == "ratio" else (outer, inside)
             found["ratio"], found["ratio_error"] = self.jackknife(lambda a, b: a / b, top, bottom)
@@ -130,7 +131,8 @@ class Expected:
 
     def table(self) -> list[dict[str, Any]]:
         rows = [self.row(kind) | self._texts(kind) for kind in self.samples["inside"]]
-        rows.sort(key=lambda r: (not r.get("supported", True), -r["key"] if not math.isnan(r["key"]) else math.inf, -r["flux"], r["expression"]))
+        tier = {row["expression"]: 0 if row.get("supported", True) else 1 + (row["samples"] == 1) for row in rows}
+        rows.sort(key=lambda r: (tier[r["expression"]], -r["key"] if not math.isnan(r["key"]) else math.inf, -r["flux"], r["expression"]))
         running = 0.0
         for number, row in enumerate(rows, start=1):
             running += row["share"]
@@ -204,7 +206,7 @@ def test_whole_images(synthetic: tuple[pathlib.Path, list[OnePath]], asked: Ques
     with open_run(folder) as run:
         found = rank(run, **asked)
         assert_same(found, Expected(run, paths, None, 0.0, asked).table())
-    assert sum(found["samples"].to_pylist()) == len(paths)
+    assert sum(found["paths"].to_pylist()) == len(paths)
     assert found["cumulative"][-1].as_py() == pytest.approx(1)
 
 
@@ -219,10 +221,10 @@ def test_merged_classes_are_sums(synthetic: tuple[pathlib.Path, list[OnePath]]) 
         merged, single = rank(run, "spot", merge=True).to_pylist(), rank(run, "spot").to_pylist()
     sums: dict[str, list[float]] = collections.defaultdict(lambda: [0.0, 0, 0.0])
     for row in single:
-        for k, name in enumerate(("flux", "samples")):
+        for k, name in enumerate(("flux", "paths")):
             sums[row["descriptor"]][k] += row[name]
         sums[row["descriptor"]][2] += row["flux_error"] ** 2
-    assert {row["descriptor"]: (pytest.approx(row["flux"]), row["samples"]) for row in merged} == {k: tuple(v[:2]) for k, v in sums.items()}
+    assert {row["descriptor"]: (pytest.approx(row["flux"]), row["paths"]) for row in merged} == {k: tuple(v[:2]) for k, v in sums.items()}
     assert max(map(len, (merged, single))) > len(merged)
     # Errors are the merged sums' own, not sums of errors
     assert any(row["flux_error"] != pytest.approx(math.sqrt(sums[row["descriptor"]][2]), rel=1e-3) for row in merged)
@@ -246,14 +248,14 @@ def test_supported_classes_come_first(run: Run) -> None:
     supported = table["supported"].to_pylist()
     assert supported == sorted(supported, reverse=True)
     assert 3 < sum(supported) < len(supported) - 3
-    assert [row["walks"] >= 4 for row in table.to_pylist()] == supported
+    assert [row["samples"] >= 4 for row in table.to_pylist()] == supported
     lower = [row["lower"] or 0.0 for row in table.to_pylist() if row["supported"]]
     assert lower == sorted(lower, reverse=True)
 
 
 def test_classes_without_walks_in_the_ring_have_a_bound(run: Run) -> None:
     table = rank(run, "spot", by="discrimination", with_objects=True, minimum_support=1)
-    lonely = [row for row in table.to_pylist() if row["ring_walks"] == 0]
+    lonely = [row for row in table.to_pylist() if row["ring_samples"] == 0]
     assert lonely
     assert all(row["ratio"] is None and row["ring_share"] == 0 for row in lonely)
     bounded = [row["lower"] for row in lonely if row["lower"] is not None]
@@ -269,6 +271,33 @@ def test_a_walk_more_in_the_ring_lowers_the_bound() -> None:
     assert all(stats.poisson.cdf(n, mean) == pytest.approx(1 - orders.LEVEL) for n, mean in enumerate(most))
 
 
+@pytest.mark.parametrize("replicates", [1, 4])
+def test_a_class_seen_once_is_never_first(tmp_path: pathlib.Path, replicates: int) -> None:
+    """Where no class has the support, and even where no error is known and the ring has none of the class."""
+    made = make_run(tmp_path / "run", "path", seed=3, passes=8, sampler="sobol", replicates=replicates)
+    scatter(made)
+    with open_run(made.folder, regions=REGIONS) as run:
+        rows = rank(run, "spot", by="discrimination", minimum_support=10**6).to_pylist()
+    once = [row["samples"] == 1 for row in rows]
+    assert 3 < sum(once) < len(once)
+    assert once == sorted(once)
+
+
+def test_few_walks_in_the_ring_are_said(run: Run) -> None:
+    """The error of a ratio rests on the ring, too: one walk there tells nothing of its error, however many are inside."""
+    rows = rank(run, "spot", by="discrimination", with_objects=True, minimum_support=1).to_pylist()
+    few = [row for row in rows if row["ring_samples"] < 20]
+    assert len(few) > 3
+    assert all(row["ring_verdict"] for row in few)
+    assert {row["ring_verdict"] for row in few if row["ring_samples"] == 0} == {"no walks"}
+
+
+def test_the_expression_to_copy_comes_last(run: Run) -> None:
+    for by in orders.ORDERS:
+        assert rank(run, "spot", by=by).column_names[-2:] == ["expression", "selection"]
+    assert rank(run).column_names[-1] == "expression"
+
+
 def test_literal_is_the_inverse_of_ratio(run: Run) -> None:
     ratio = {row["expression"]: row["ratio"] for row in rank(run, "spot", by="ratio").to_pylist()}
     literal = {row["expression"]: row["ratio"] for row in rank(run, "spot", by="literal").to_pylist()}
@@ -280,9 +309,9 @@ def test_literal_is_the_inverse_of_ratio(run: Run) -> None:
 def test_ties_go_by_flux_then_by_expression() -> None:
     names = ["d", "b", "a", "c", "e"]
     key, flux = np.array([1.0, 2.0, 2.0, 2.0, -np.inf]), np.array([9.0, 4.0, 4.0, 5.0, 1.0])
-    order = _order(key, flux, None, lambda i: names[i], None)
+    order = _order(key, flux, np.zeros(5, int), lambda i: names[i], None)
     assert [names[i] for i in order] == ["c", "a", "b", "d", "e"]
-    again = _order(key[::-1], flux[::-1], None, lambda i: names[::-1][i], None)
+    again = _order(key[::-1], flux[::-1], np.zeros(5, int), lambda i: names[::-1][i], None)
     assert [names[::-1][i] for i in again] == ["c", "a", "b", "d", "e"]
 
 
@@ -355,6 +384,11 @@ def rendered(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
 @pytest.mark.parametrize("asked", [*QUESTIONS.values(), {"with_objects": True, "by": "discrimination", "at": "any"}], ids=str)
 def test_rendered_runs(rendered: Run, asked: Question) -> None:
     assert_same(rank(rendered, "spot", **asked), Expected(rendered, paths_of_run(rendered), *PLACE, asked).table())
+
+
+def test_many_walks_in_the_ring_are_trusted(rendered: Run) -> None:
+    verdicts = {row["ring_verdict"] is None for row in rank(rendered, "spot", by="ratio", at="any", outer=4.0).to_pylist()}
+    assert verdicts == {True, False}
 
 
 def test_selections_select_the_paths(rendered: Run) -> None:

@@ -171,3 +171,12 @@ def test_a_file_is_no_run(tmp_path: pathlib.Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(RunError, match="found a file"):
         open_run(tmp_path / "file")
+
+
+def test_some_shards_or_none(path_run: SyntheticRun) -> None:
+    with open_run(path_run.folder, shards=range(1)) as first, open_run(path_run.folder, shards=range(0)) as none:
+        assert 0 < first.tables["paths"].num_rows < len(path_run.rows)
+        assert none.shard_files == []
+        assert none.sql("SELECT count(*) AS n FROM paths")["n"].to_pylist() == [0]
+    with pytest.raises(RunError, match="lacks shards/00099"):
+        open_run(path_run.folder, shards=range(99, 100))

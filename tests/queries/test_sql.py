@@ -12,9 +12,10 @@ import pyarrow as pa
 import pytest
 from synthetic import SyntheticRun
 
-from queries import Run, open_run
+from queries import Run, open_run, sql
 from queries.errors import QueryError, QueryTimeout
 from queries.sql import FORMATS, query, stream, write
+from queries.sql_calls import replace_calls
 
 
 @pytest.fixture
@@ -139,6 +140,37 @@ def test_a_query_ends_at_its_time_limit(run: Run) -> None:
             pass
     assert time.monotonic() - start < 20
     assert query(run, "SELECT 1 AS a", time_limit=30)["a"].to_pylist() == [1]
+
+
+@pytest.mark.parametrize("slow", ["classification", "planning"])
+def test_the_limit_holds_where_it_passes_between_statements(run: Run, monkeypatch: pytest.MonkeyPatch, slow: str) -> None:
+    """What no check sees: time that runs out before DuckDB begins, so that there is nothing to interrupt yet."""
+    target, name = ("queries.sql.make_views", "make_views") if slow == "classification" else ("queries.sql.batches", "batches")
+    original = getattr(sql, name)
+
+    def late(*given: object) -> object:
+        time.sleep(0.3)
+        return original(*given)
+
+    monkeypatch.setattr(target, late)
+    start = time.monotonic()
+    with pytest.raises(QueryTimeout):
+        query(run, "SELECT sum(a.i * b.i) FROM range(100000000) a(i), range(100000) b(i)", time_limit=0.1)
+    assert time.monotonic() - start < 20
+
+
+def test_answers_before_the_last_are_dropped(run: Run) -> None:
+    assert query(run, "SELECT 1; SELECT * FROM range(300000); EXPLAIN SELECT 2; SELECT 3 AS a")["a"].to_pylist() == [3]
+    with pytest.raises(QueryTimeout):
+        query(run, "SELECT * FROM range(1000000000000); SELECT 3 AS a", time_limit=0.2)
+
+
+def test_long_texts_end_soon(run: Run) -> None:
+    start = time.monotonic()
+    with pytest.raises(QueryError, match="at most 100,000 characters"):
+        query(run, "SELECT 1" + " UNION ALL SELECT 1" * 20_000)
+    assert replace_calls("/**/" * 500_000 + "lpe('C L')", lambda call, _: call.text).endswith("*/C L")
+    assert time.monotonic() - start < 10
 
 
 def test_a_query_too_large_for_memory_and_disk_is_an_error(path_run: SyntheticRun) -> None:

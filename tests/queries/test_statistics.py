@@ -207,6 +207,7 @@ def test_verdicts_say_why() -> None:
     assert verdicts(moments_of(firefly)) == ["one walk of 1,000 carries 71% of the squares"]
     assert verdicts(moments_of(few)) == ["15 walks count as 15 for the variance"]
     assert verdicts(moments_of(np.ones((1, 25)))) == [""]
+    assert verdicts(moments_of(np.zeros((1, 25)))) == ["no walks"]
 
 
 def test_unit_rules_are_plain() -> None:
