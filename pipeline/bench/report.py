@@ -101,7 +101,7 @@ def write_charts(out: pathlib.Path, session: Session, results: Mapping[str, Sect
         figures, asked = results["questions"].figures, {question.what for question in session.benchmark.questions.ask}
         walls = {what: spread(seconds) for what, seconds in figures["wall_seconds"].items()}
         times = [TimeBar(what, wall.median, wall.low, wall.high, what in asked) for what, wall in walls.items()]
-        time_chart(out / "questions.png", times, f"Questions of {figures['paths'] / 1e6:.1f} million paths, {where}")
+        time_chart(out / "questions.png", times, f"Questions of {figures['paths'] / 1e6:.1f} million paths")
         charts["questions"] = "questions.png"
     return charts
 
