@@ -38,6 +38,7 @@ CONSTANT_BLACK = Slot(BLACK, -1)
 DISTRIBUTIONS = {"beckmann": BECKMANN, "ggx": GGX}
 TRANSMISSIVE = ("dielectric", "roughdielectric", "thindielectric")
 BSDFS = (*KINDS, "twosided")
+_DEFAULT = Node("diffuse", "diffuse", "")  # of shapes without a BSDF: gray
 
 
 @dataclass
@@ -78,11 +79,11 @@ class MaterialTable:
     context: Context
     kinds: list[int] = field(default_factory=list)
     rows: list[Material] = field(default_factory=list)
-    of_node: dict[int, int] = field(default_factory=dict)
+    of_node: dict[int, tuple[Node, int]] = field(default_factory=dict)  # by the node's id; it is kept, so that no other node gets that id
 
     def sides(self, node: Node | None) -> Sides:
         """A shape's BSDF; None stands for Mitsuba's default, gray diffuse."""
-        node = node or Node("diffuse", "diffuse", "")
+        node = node or _DEFAULT
         name = node.name if node.named else node.plugin
         if node.plugin != "twosided":
             row = self.row(node)
@@ -108,8 +109,8 @@ class MaterialTable:
             reader.finish()
             self.kinds.append(KINDS.index(node.plugin))
             self.rows.append(material)
-            self.of_node[id(node)] = len(self.rows) - 1
-        return self.of_node[id(node)]
+            self.of_node[id(node)] = (node, len(self.rows) - 1)
+        return self.of_node[id(node)][1]
 
     def families(self) -> Families:
         """Which families beside diffuse the scene has."""

@@ -49,7 +49,7 @@ class TextureTable:
 
     def __init__(self) -> None:
         self.rows: list[Row] = []
-        self.of_node: dict[int, int] = {}
+        self.of_node: dict[int, tuple[Node, int]] = {}  # by the node's id; it is kept, so that no other node gets that id
         self.images: dict[tuple[pathlib.Path, bool], npt.NDArray[np.float32]] = {}
 
     def row(self, node: Node, context: "Context") -> int:
@@ -58,8 +58,8 @@ class TextureTable:
             reader = Reader(node)
             self.rows.append(self.bitmap(reader, context) if node.plugin == "bitmap" else checkerboard(reader))
             reader.finish()
-            self.of_node[id(node)] = len(self.rows) - 1
-        return self.of_node[id(node)]
+            self.of_node[id(node)] = (node, len(self.rows) - 1)
+        return self.of_node[id(node)][1]
 
     def bitmap(self, reader: Reader, context: "Context") -> Row:
         """An image file; ``raw`` says that its values are already linear."""

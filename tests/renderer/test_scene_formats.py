@@ -161,6 +161,13 @@ def test_unnamed_shapes_get_names_of_their_own(tmp_path: pathlib.Path) -> None:
     assert_same(scene, load_scene(scene.description))
 
 
+def test_shapes_without_a_bsdf_share_the_default() -> None:
+    shapes = {f"cube{i}": {"type": "cube"} for i in range(40)}
+    shapes |= {f"red{i}": {"type": "cube", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [i / 40, 0, 0]}}} for i in range(40)}
+    scene = load_scene({"type": "scene", "sensor": {"type": "perspective"}, "sky": {"type": "constant"}} | shapes)
+    assert len(scene.arrays.materials.kind) == 1 + 40
+
+
 def test_dictionary_of_load_dict_with_transform_objects() -> None:
     import mitsuba as mi
 
