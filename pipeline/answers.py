@@ -10,11 +10,10 @@ from pipeline.errors import JobError
 from pipeline.files import clear_errors
 from pipeline.images import F32, write_exr, write_png
 from queries.images import select
+from queries.kernels.luminance import LUMINANCE
 from queries.regions import parse_region
 from queries.run import Run, open_run
 from queries.sql import TIME_LIMIT, stream, write
-
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 
 
 def print_rows(path: pathlib.Path, text: str, format: str, time_limit: float | None = None, define: Sequence[str] = ()) -> None:
@@ -60,4 +59,4 @@ def _write_image(path: pathlib.Path, pixels: F32, run: Run, expression: str) -> 
 
 
 def _mean_luminance(pixels: F32) -> float:
-    return float(pixels.mean(axis=(0, 1), dtype=np.float64) @ _LUMINANCE)
+    return float(pixels.mean(axis=(0, 1), dtype=np.float64) @ np.array(LUMINANCE))

@@ -5,7 +5,7 @@ import errno
 import json
 import os
 import pathlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, BinaryIO
 
@@ -113,6 +113,14 @@ def checksum(path: pathlib.Path) -> tuple[int, str]:
             digest.update(buffer[:count])
             size += count
     return size, digest.hexdigest()
+
+
+def is_whole(path: pathlib.Path, known: Mapping[str, Any]) -> bool:
+    """Whether a file is there with the size and digest that its record (``FileRecord.as_json``) says."""
+    try:
+        return checksum(path) == (known["bytes"], known["xxh3"])
+    except (KeyError, OSError):
+        return False
 
 
 @contextlib.contextmanager

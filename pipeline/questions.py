@@ -64,6 +64,8 @@ def _check_regions(loaded: LoadedJob, scene: Scene | None) -> None:
         place = loaded.region_places[name]
         if scene and description.object is not None and description.object.name not in objects:
             raise JobError(f"`regions.{name}`: the scene has no object `{description.object.name}` (it has {', '.join(objects)})", place)
+        if scene:
+            continue  # read before the scene was
         try:
             region(description, loaded.folder).check()
         except QueryError as error:
@@ -77,8 +79,11 @@ def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
         return
     from queries.errors import QueryError
     from queries.lpe import compile
+    from queries.lpe.names import kinds_by_name
 
-    names = _names(scene) if scene else None
+    names = None
+    if scene:
+        names = kinds_by_name((o.name for o in scene.objects), (o.material for o in scene.objects), (e.name for e in scene.emitters))
     for name, text in job.aovs.items():
         try:
             expression = compile(text, job.dialect, objects=names, regions=set(job.regions))
@@ -89,16 +94,3 @@ def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
             raise JobError(f"`aovs.{name}`: `{prefix};` reads blocked connections: add `record: {{occluded: true}}`", loaded.aov_places[name])
         for warning in expression.warnings if scene else ():
             LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
-
-
-def _names(scene: Scene) -> dict[str, set[str]]:
-    """What `@object:`, `@material:` and `@light:` may name, and which of them."""
-    found: dict[str, set[str]] = {}
-    for kind, names in (
-        ("object", [thing.name for thing in scene.objects]),
-        ("material", [thing.material for thing in scene.objects]),
-        ("light", [emitter.name for emitter in scene.emitters]),
-    ):
-        for name in names:
-            found.setdefault(name, set()).add(kind)
-    return found

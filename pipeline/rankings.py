@@ -8,7 +8,7 @@ from typing import Any, BinaryIO, cast
 import pyarrow as pa
 
 from pipeline.config import Job, Rank
-from pipeline.files import FileRecord, checksum, new_file
+from pipeline.files import FileRecord, is_whole, new_file
 from pipeline.progress import Progress
 from pipeline.run_folder import RunFolder
 from queries.regions import parse_region
@@ -42,11 +42,8 @@ def write_rankings(
 
 def _is_there(folder: RunFolder, name: str, question: dict[str, Any], known: dict[str, Any]) -> bool:
     """Whether the ranking was made before, of the same question, and its files are whole."""
-    try:
-        same = {key: known[key] for key in question} == question
-        return same and all(checksum(folder.ranking(name, kind)) == (known[kind]["bytes"], known[kind]["xxh3"]) for kind in KINDS)
-    except (KeyError, OSError):
-        return False
+    same = {key: known.get(key) for key in question} == question
+    return same and all(is_whole(folder.ranking(name, kind), known.get(kind, {})) for kind in KINDS)
 
 
 def ranked(run: Run, asked: Rank, threads: int | None) -> pa.Table:

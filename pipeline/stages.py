@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import os
 import pathlib
 import resource
 import sys
@@ -16,13 +15,14 @@ from pipeline import catalogues, film_sum, images
 from pipeline.errors import JobError, RunFolderError
 from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large, refuse_too_much_memory
 from pipeline.executor import render_shards
-from pipeline.files import FileRecord, checksum, clear_errors
+from pipeline.files import FileRecord, checksum, clear_errors, is_whole
 from pipeline.identity import camera, differences, processor, renderer_version, settings_as_json, versions
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.questions import region_terms
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
 from pipeline.shards import Shard, plan_shards, shard_count, shard_size
+from queries.shards import cores
 from renderer.film import Film
 from renderer.trace import Tracer
 
@@ -52,15 +52,10 @@ def peak_rss_bytes() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
-def default_threads() -> int:
-    """The cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def validate_job(path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib.Path | None = None) -> tuple[PreparedJob, SizeEstimate]:
     """Check a job as ``run`` would, and estimate its size; nothing is written. Raises JobError and SceneError."""
     prepared = prepare_job(path, overrides)
-    refuse_too_much_memory(prepared.settings, default_threads())
+    refuse_too_much_memory(prepared.settings, cores())
     size = estimate_size(Tracer(prepared.scene, prepared.settings), prepared.settings)
     refuse_too_large(size, RunFolder(prepared.loaded.run_folder(out)))
     return prepared, size
@@ -73,7 +68,7 @@ def run_job(
     watch = Stopwatch()
     with watch.stage("scene"):
         prepared = prepare_job(path, overrides)
-    threads = threads or default_threads()
+    threads = threads or cores()
     refuse_too_much_memory(prepared.settings, threads)
     folder = RunFolder(prepared.loaded.run_folder(out))
     with folder.locked(), clear_errors("running the job", folder.path), log_file(folder.path / "log.txt"):
@@ -290,8 +285,8 @@ class Run:
         known = self.manifest["images"].get(LAYERS, {})
         try:
             same = known["expressions"] == self.job.aovs and known["terms"] == self._terms()
-            return bool(same) and checksum(self.folder.image(LAYERS, "exr")) == (known["exr"]["bytes"], known["exr"]["xxh3"])
-        except (KeyError, OSError):
+            return bool(same) and is_whole(self.folder.image(LAYERS, "exr"), known["exr"])
+        except KeyError:
             return False
 
     def _write_layers(self) -> None:
@@ -308,8 +303,8 @@ class Run:
         known = self.manifest["images"].get(name, {})
         try:
             same = known["exposure"] == self.job.images.exposure and known["expression"] == expression and known["terms"] == self._terms()
-            return same and checksum(self.folder.image(name, "exr")) == (known["exr"]["bytes"], known["exr"]["xxh3"])
-        except (KeyError, OSError):
+            return same and is_whole(self.folder.image(name, "exr"), known["exr"])
+        except KeyError:
             return False
 
     def _write_image(self, name: str, image: images.F32, expression: str | None) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.classify import Classifier
-from queries.errors import QueryError, RunError
+from queries.errors import RunError
 from queries.kernels.splat import splat_box, splat_filter
 from queries.lpe import Expression
 from queries.run import MEMORY_LIMIT, Run, open_run
@@ -111,8 +111,7 @@ class _Film:
 
 def _resolve(run: Run, expressions: list[Expression | None], threads: int | None) -> list[Selected]:
     settings = run.settings
-    if settings["keep"] <= 0 or "paths" not in run.tables:
-        raise QueryError(f"`{run.path}` recorded no paths (record.keep is none), so no image can be made of them: record some, as in `keep: 0.1`")
+    run.require_paths("no image can be made of them")
     layers = [_Layer(Classifier(run, given) if given else None, terms_of(run, given)) for given in expressions]
     filter = reconstruction_filter(settings["filter"])
     film = _Film(settings["width"], settings["height"], filter, filter.table().astype(np.float64))

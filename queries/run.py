@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 import pyarrow as pa
 
-from queries.errors import RunError
+from queries.errors import QueryError, RunError
 from queries.views import CATALOGUES, RECORDED, create_views
 from queries.word_tree import WordTree
 
@@ -98,6 +98,17 @@ class Run:
 
         return SceneGeometry(self)
 
+    def require_paths(self, lost: str) -> None:
+        """Raise ``QueryError`` where the run recorded no paths; ``lost`` says what is not possible without them."""
+        if self.settings["keep"] <= 0 or "paths" not in self.tables:
+            raise QueryError(f"`{self.path}` recorded no paths (record.keep is none), so {lost}: record some, as in `keep: 0.1`")
+
+    def require_whole(self) -> None:
+        """Raise ``QueryError`` where only some shards are open."""
+        found, shards = len(self.shard_files), self.manifest["shards"]["count"]
+        if found != shards:
+            raise QueryError(f"expected a whole run, found {found} of {shards} shards open: open all of it, `{self.path}` without `shards`")
+
     def compile(self, text: str, dialect: str = "std") -> "Expression":
         """A light path expression whose names are those of this run. Raises ``ExpressionError``."""
         from queries.lpe import compile
@@ -107,13 +118,10 @@ class Run:
     @functools.cached_property
     def names(self) -> dict[str, frozenset[str]]:
         """The names of objects, materials and emitters, each with what it names: ``object``, ``material``, ``light``."""
-        listed = {"object": ("objects", "name"), "material": ("objects", "material"), "light": ("emitters", "name")}
-        found: dict[str, set[str]] = {}
-        for kind, (table, column) in listed.items():
-            for name in self.tables[table][column].to_pylist():
-                if name:
-                    found.setdefault(name, set()).add(kind)
-        return {name: frozenset(kinds) for name, kinds in found.items()}
+        from queries.lpe.names import kinds_by_name
+
+        objects, emitters = self.tables["objects"], self.tables["emitters"]
+        return kinds_by_name(objects["name"].to_pylist(), objects["material"].to_pylist(), emitters["name"].to_pylist())
 
     def sql(self, text: str, time_limit: float | None = 60.0) -> pa.Table:
         """The answer to a query as an Arrow table (``queries.sql.query``)."""

@@ -3,13 +3,13 @@
 import numpy as np
 import numpy.typing as npt
 
+from queries.kernels.luminance import LUMINANCE
 from queries.kernels.tally import tally
 from queries.shards import Piece
 from queries.statistics import Moments, Units
 
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
-LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 class Tally:

@@ -14,13 +14,11 @@ from pipeline.bench.timing import timed
 from pipeline.bench.worker import serve
 from pipeline.config import Rank
 from pipeline.rankings import ranked
-from queries.classify import Classifier
-from queries.images import aov_image
+from queries.images import aov_image, select
+from queries.kernels.luminance import LUMINANCE
 from queries.run import Run, open_run
 from queries.shards import map_shards
 from queries.word_tree import CAMERA, WordTree
-
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB
 
 
 def asker(path: pathlib.Path, threads: int) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
@@ -36,7 +34,7 @@ def asker(path: pathlib.Path, threads: int) -> Callable[[Mapping[str, Any]], dic
         if request.get("peak"):
             return {"peak_bytes": own_peak_bytes()}
         if request.get("count"):
-            return {"matched": _matched(run, request["count"], threads)}
+            return {"matched": select(run, {"asked": request["count"]}, threads)["asked"].rows}
         if request.get("regex"):
             spelled.append(spelled.pop() if spelled else spell(run.words, run))
             with timed() as watch:
@@ -46,15 +44,10 @@ def asker(path: pathlib.Path, threads: int) -> Callable[[Mapping[str, Any]], dic
             if request.get("rank"):
                 light = ranked(run, Rank.model_validate(request["rank"]), threads).num_rows
             else:
-                light = float(aov_image(run, run.compile(request["expression"]), threads).mean(axis=(0, 1)) @ _LUMINANCE)
+                light = float(aov_image(run, run.compile(request["expression"]), threads).mean(axis=(0, 1)) @ np.array(LUMINANCE))
         return {"wall": watch.timing.wall, "cpu": watch.timing.cpu, "answer": light}
 
     return answer
-
-
-def _matched(run: Run, text: str, threads: int) -> int:
-    classifier = Classifier(run, run.compile(text))
-    return sum(map_shards(run.shard_files, lambda pieces: sum(int(np.count_nonzero(classifier.select(piece))) for piece in pieces), threads))
 
 
 def spell(words: WordTree, run: Run) -> list[str]:

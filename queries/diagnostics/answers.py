@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from queries.errors import QueryError
 from queries.run import Run
 
 F64 = npt.NDArray[np.float64]
@@ -37,10 +36,8 @@ def meanings(table: pa.Table) -> dict[str, str]:
 
 def require_paths(run: Run) -> None:
     """Raise ``QueryError`` where a run recorded no paths, or is open in part."""
-    if run.settings["keep"] <= 0 or "paths" not in run.tables:
-        raise QueryError(f"`{run.path}` recorded no paths (record.keep is none), so nothing can be diagnosed: record some, as in `keep: 0.1`")
-    if len(run.shard_files) != run.manifest["shards"]["count"]:
-        raise QueryError(f"`{run.path}` is open in part ({len(run.shard_files)} shards): open all of it to diagnose it")
+    run.require_paths("nothing can be diagnosed")
+    run.require_whole()
 
 
 def pixels_of(run: Run) -> int:

@@ -8,17 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.kernel import kernel
+from queries.kernels.luminance import luminance
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 Walk = npt.NDArray[np.generic]
 I32 = npt.NDArray[np.int32]
-
-
-@kernel
-def luminance(r: np.float32, g: np.float32, b: np.float32) -> np.float64:
-    """Luminance of linear sRGB."""
-    return np.float64(r) * 0.2126 + np.float64(g) * 0.7152 + np.float64(b) * 0.0722
 
 
 @kernel

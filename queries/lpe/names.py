@@ -1,7 +1,7 @@
 """The names that a run knows, and what was probably meant by one that it does not."""
 
 import difflib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from queries.errors import ExpressionError
@@ -53,6 +53,20 @@ class Known:
             wanted, found = _SERVES[field][0], sorted(kinds)[0]
             said = f"`{_short(name)}` is no {wanted} but {_ARTICLE[found]} {found}"
             raise ExpressionError(f"{said}: say `@{found}:{_short(name)}` (in the notation `std`)", column)
+
+
+def kinds_by_name(objects: Iterable[str], materials: Iterable[str], lights: Iterable[str]) -> dict[str, frozenset[str]]:
+    """All names, each with what it names, as ``Known.objects`` takes them; empty names are none.
+
+    >>> sorted(kinds_by_name(["lamp"], ["white"], ["lamp"])["lamp"])
+    ['light', 'object']
+    """
+    found: dict[str, set[str]] = {}
+    for kind, names in (("object", objects), ("material", materials), ("light", lights)):
+        for name in names:
+            if name:
+                found.setdefault(name, set()).add(kind)
+    return {name: frozenset(kinds) for name, kinds in found.items()}
 
 
 def nearest(name: str, names: Collection[str]) -> str:
