@@ -88,6 +88,8 @@ def run(
         folder = run_job(config, settings or (), out, resume, threads)
         typer.echo(f"image:  {folder.image('beauty', 'exr')}")
         typer.echo(f"tables: {folder.path / 'tables'}")
+        if folder.report.exists():
+            typer.echo(f"report: {folder.report}")
 
 
 @app.command()
@@ -195,6 +197,46 @@ def diagnose(
             raise JobError("expected a run folder: pathspace diagnose RUN")
         else:
             print_diagnostics(run, names or (), format.value, top, explain)
+
+
+@app.command()
+def view(
+    run: RunArgument,
+    what: Annotated[str | None, typer.Argument(metavar="[VIEW|TOOL]", help="A view of the job, or a tool (default: list both).")] = None,
+    expression: Annotated[str | None, typer.Option("--expression", metavar="EXPR", help="Draw only the light that this expression selects.")] = None,
+    dialect: Annotated[Dialect | None, typer.Option("--dialect", help="The notation of the expression (default: the job's).")] = None,
+    region: Annotated[str | None, typer.Option("--region", metavar="NAME", help="Only light with an interaction in this region.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="A key of the view, such as `bundles.most=500` or `look.scene=cut`; repeatable."),
+    ] = None,
+    define: DefineOption = None,
+    out: Annotated[pathlib.Path | None, typer.Option("--out", metavar="PNG", help="The picture to write (default: `<name>.png` here).")] = None,
+) -> None:
+    """Draw what light does: bundled paths, irradiance, probes, fluence, flow, time of flight."""
+    with _clear_exit():
+        from pipeline.views import print_view
+
+        named = {"expression": expression, "dialect": dialect and dialect.value, "region": region}
+        print_view(run, what, {key: value for key, value in named.items() if value is not None}, settings or (), define or (), out)
+
+
+@app.command()
+def report(
+    run: RunArgument,
+    out: Annotated[
+        pathlib.Path | None, typer.Option("--out", metavar="DIR", help="The folder to write (default: `report` in the run folder).")
+    ] = None,
+    top: Annotated[int | None, typer.Option("--top", metavar="N", min=0, max=20, help="Classes of each ranking that get a picture.")] = None,
+    paths: Annotated[int | None, typer.Option("--paths", metavar="N", min=0, max=20_000, help="Paths in the three-dimensional view.")] = None,
+) -> None:
+    """Write a run's offline report: one folder that any browser opens, without a network."""
+    with _clear_exit():
+        from pipeline.progress import log_to_stderr
+        from pipeline.report import print_report
+
+        log_to_stderr()
+        print_report(run, out, {key: value for key, value in {"top": top, "paths": paths}.items() if value is not None})
 
 
 @app.command()

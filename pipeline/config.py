@@ -8,6 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from queries.regions import RegionDescription, RegionName
 from renderer.scene.sensors import LARGEST_FILM
 from renderer.settings import UNBOUNDED_DEPTH
+from viz.cameras import CameraDescription
+from viz.description import JOB_CAMERA, View
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 
@@ -117,6 +119,19 @@ class Rank(Section):
     top: int | None = Field(default=None, ge=1, description="How many classes are listed. Default: all.")
 
 
+class Inspection(Section):
+    """Light walks beside a run of camera walks, in its folder `inspection/`: what irradiance, probes, fluence and flow are estimated from."""
+
+    samples: int = Field(default=16, ge=1, le=2**31, description="Light walks for each pixel of the film, as `render.samples` counts them.")
+
+
+class Report(Section):
+    """The offline report: one folder, `report/` in the run folder, that any browser opens; it needs no network."""
+
+    top: int = Field(default=3, ge=0, le=20, description="For how many classes of each ranking a picture of bundled paths is drawn.")
+    paths: int = Field(default=600, ge=0, le=20_000, description="Paths in the three-dimensional view that a person can turn; 0 leaves it out.")
+
+
 class Images(Section):
     """How the pictures beside the linear images are made."""
 
@@ -137,6 +152,10 @@ class Job(Section):
         default={}, description="Images of some of the light: name -> light path expression, computed from the tables after rendering."
     )
     rank: dict[Name, Rank] = Field(default={}, description="Rankings of the classes of paths in a region: name -> what is ranked, and how.")
+    cameras: dict[Name, CameraDescription] = Field(default={}, description="Named cameras for `views`.")
+    views: dict[Name, View] = Field(default={}, description="Pictures of what light does: name -> what is drawn, and how it is shown.")
+    inspection: Inspection | None = Field(default=None, description="Light walks for the tools that measure light. Default: none are traced.")
+    report: Report | None = Field(default=None, description="The offline report. Default: none is written; `report: {}` writes one.")
     images: Images = Field(default=Images(), description="How pictures are made.")
     out: str | None = Field(default=None, min_length=1, description="The run folder. Default: `runs/<name>` in the folder where the command is run.")
 
@@ -145,6 +164,13 @@ class Job(Section):
     def _scene(cls, value: Any) -> Any:
         if not isinstance(value, (str, dict)) or not value:
             raise ValueError("expected the path of a scene file, or a dictionary that describes the scene")
+        return value
+
+    @field_validator("cameras")
+    @classmethod
+    def _no_job_camera(cls, value: dict[str, CameraDescription]) -> dict[str, CameraDescription]:
+        if JOB_CAMERA in value:
+            raise ValueError(f"`{JOB_CAMERA}` is the name of the scene's own camera: choose another name")
         return value
 
     @field_validator("aovs")

@@ -2,24 +2,16 @@
 
 import json
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
-from pipeline.config import Images, Job, Rank, Record, Render
-from queries.regions import description as regions
+from pipeline.config import Job, Render
+from pipeline.job_file import inner_types
+from viz.tools.base import Tool
 
-_SECTIONS: dict[str, type[BaseModel]] = {"render": Render, "record": Record, "images": Images}
-_NAMED: dict[str, type[BaseModel]] = {  # sections that a job may have any number of, each with its name
-    "regions.NAME": regions.RegionDescription,
-    "regions.NAME.sphere": regions.SphereDescription,
-    "regions.NAME.box": regions.BoxDescription,
-    "regions.NAME.box.rotate": regions.Rotation,
-    "regions.NAME.object": regions.ObjectDescription,
-    "regions.NAME.mesh": regions.MeshDescription,
-    "regions.NAME.stroke": regions.StrokeDescription,
-    "rank.NAME": Rank,
-}
+_TOOL = "views.NAME.TOOL"
 _EXAMPLE = """\
 name: cornell
 scene: scenes/cornell.yaml          # or a Mitsuba 3 .xml
@@ -41,6 +33,11 @@ aovs:
   bleeding: "C D@bleeding X@object:left_wall .* L"
 rank:
   bleeding: {region: bleeding, with_objects: true, top: 20}
+inspection: {samples: 16}  # light walks beside the camera's, for what measures light
+views:
+  bleeding: {bundles: {expression: "C D D@object:left_wall L", most: 1500, color: chrominance}}
+  irradiance: {irradiance: {}}
+report: {}
 """
 
 
@@ -55,15 +52,30 @@ def job_docs() -> str:
         f"```yaml\n{_EXAMPLE}```",
         _table("The job", Job, ""),
     ]
-    parts += [_table(f"`{name}`", section, f"{name}.") for name, section in (_SECTIONS | _NAMED).items()]
+    for name, section in sections(Job):
+        if name == "views.NAME.bundles":
+            parts.append(_table(f"`{_TOOL}`: keys of every tool", Tool, f"{_TOOL}."))
+        parts.append(_table(f"`{name}`", section, f"{name}."))
     parts += [
         "## Rules",
         "- Paths are relative to the job's file. `--out DIR` says where one run is written, whatever the job says.\n"
         "- What makes a run the same run is its scene and its `render` and `record` settings: `--resume` goes on with it, also with other\n"
-        "  `regions`, `aovs` and `rank`.\n"
+        "  `regions`, `aovs`, `rank`, `views`, `inspection` and `report`: what is there already, and asked for in the same words, is kept.\n"
         "- PNG images are for looking: linear values are multiplied by 2^exposure, clipped to 0 … 1 and given the sRGB curve. EXR images are linear.",
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def sections(model: type[BaseModel], prefix: str = "", seen: set[type[BaseModel]] | None = None) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Every section of a schema, once, and its dotted name, outer ones first; ``NAME`` stands for any name, ``N`` for a place in a list."""
+    seen = set() if seen is None else seen
+    for key, field in model.model_fields.items():
+        for step, kind in inner_types(field.annotation):
+            if isinstance(kind, type) and issubclass(kind, BaseModel) and kind not in seen:
+                seen.add(kind)
+                name = f"{prefix}{key}{step}"
+                yield name, kind
+                yield from sections(kind, f"{name}.", seen)
 
 
 def _table(title: str, model: type[BaseModel], prefix: str) -> str:
@@ -71,24 +83,28 @@ def _table(title: str, model: type[BaseModel], prefix: str) -> str:
     described = (model.__doc__ or "").strip()
     lines = [f"## {title}", "", described, "", "| key | values | default | meaning |", "|---|---|---|---|"]
     definitions = model.model_json_schema().get("$defs", {})
+    shared = Tool.model_fields if issubclass(model, Tool) and model is not Tool else {}
     for name, schema in model.model_json_schema()["properties"].items():
-        field = model.model_fields[name]
-        section = name in _SECTIONS and model is Job
-        default = (
-            "required"
-            if field.is_required()
-            else "see below"
-            if section
-            else "the scene's"
-            if field.default is None and model is Render
-            else "none"
-            if field.default is None
-            else f"`{json.dumps(field.default)}`"
-        )
-        default = "`runs/<name>`" if name == "out" else default
-        values = "a section" if section else values_of(schema, definitions)
-        lines.append(f"| `{prefix}{name}` | {_cell(values)} | {_cell(default)} | {_cell(field.description or '')} |")
+        if name not in shared:
+            default, values = _default(model, name), values_of(schema, definitions)
+            lines.append(f"| `{prefix}{name}` | {_cell(values)} | {_cell(default)} | {_cell(model.model_fields[name].description or '')} |")
+    if shared:
+        lines.append(f"\nBeside these, the keys of every tool: `{_TOOL}`.")
     return "\n".join(lines)
+
+
+def _default(model: type[BaseModel], name: str) -> str:
+    """What holds where a key is left out."""
+    field = model.model_fields[name]
+    if field.is_required():
+        return "required"
+    if isinstance(field.default, BaseModel):
+        return "see below"
+    if model is Job and name == "out":
+        return "`runs/<name>`"
+    if field.default is None:
+        return "the scene's" if model is Render else "none"
+    return f"`{json.dumps(field.default)}`"
 
 
 def values_of(schema: dict[str, Any], definitions: dict[str, Any]) -> str:

@@ -6,13 +6,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Annotated, Any, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from pipeline.config import Job
+from pipeline.config import Job, Name
 from pipeline.errors import JobError
+from viz.description import View
 
 MAX_BYTES = 16 << 20
 MAX_NODES = 200_000
@@ -31,7 +32,10 @@ _Loader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"^[-+]?(\d+
 
 @dataclass(frozen=True)
 class LoadedJob:
-    """A job and where it came from. Places are ``file:line``, of the scene, and of each AOV, region and ranking by name."""
+    """A job and where it came from. Places are ``file:line``, of the scene, and of each AOV, region, ranking and view by name.
+
+    ``overrides``: the ``key=value`` settings that changed it.
+    """
 
     job: Job
     file: pathlib.Path
@@ -39,6 +43,8 @@ class LoadedJob:
     aov_places: dict[str, str]
     region_places: dict[str, str] = field(default_factory=dict)
     rank_places: dict[str, str] = field(default_factory=dict)
+    view_places: dict[str, str] = field(default_factory=dict)
+    overrides: tuple[str, ...] = ()
 
     @property
     def folder(self) -> pathlib.Path:
@@ -78,11 +84,29 @@ def load_job(path: pathlib.Path, settings: Sequence[str] = ()) -> LoadedJob:
         job = Job.model_validate(data)
     except ValidationError as error:
         raise _explained(error, data, place) from None
-    aovs, regions, rank = ({name: place((section, name)) for name in getattr(job, section)} for section in ("aovs", "regions", "rank"))
-    loaded = LoadedJob(job, path, place(("scene",)), aovs, regions, rank)
+    sections = ("aovs", "regions", "rank", "views")
+    aovs, regions, rank, views = ({name: place((section, name)) for name in getattr(job, section)} for section in sections)
+    loaded = LoadedJob(job, path, place(("scene",)), aovs, regions, rank, views, tuple(settings))
     if isinstance(job.scene, str) and not (path.parent / job.scene).is_file():
         raise JobError(f"there is no scene file `{path.parent / job.scene}`: paths are relative to the job's file", loaded.scene_place)
     return loaded
+
+
+class _Views(BaseModel):
+    """The views of a job alone."""
+
+    views: dict[Name, View]
+
+
+def checked_view(name: str, given: dict[str, Any], settings: Sequence[str] = ()) -> View:
+    """A view that is described outside of a job, with ``key=value`` settings of its own keys. Raises JobError."""
+    data: dict[Any, Any] = {"views": {name: dict(given)}}
+    for setting in settings:
+        _apply(data, f"views.{name}.{setting}" if "=" in setting else setting)
+    try:
+        return _Views.model_validate(data).views[name]
+    except ValidationError as error:
+        raise _explained(error, data, lambda _: f"view {name}") from None
 
 
 def _read(path: pathlib.Path) -> str:
@@ -222,7 +246,7 @@ def _explained(error: ValidationError, data: Any, place: Any) -> JobError:
     """One message for all the complaints of the schema; each names its key, what was found and the nearest known key."""
     lines: dict[Location, str] = {}
     for item in error.errors(include_url=False):
-        location = _location(item["loc"], data)
+        location = _location(item["loc"], data, item["type"] == "missing")
         found = _value(data, location)
         name = ".".join(map(str, location)) or "job"
         if item["type"] == "extra_forbidden":
@@ -238,20 +262,23 @@ def _explained(error: ValidationError, data: Any, place: Any) -> JobError:
     return JobError(message, place(first))
 
 
-def _location(steps: Sequence[str | int], data: Any) -> Location:
-    """The part of pydantic's location that names keys of the data (it also names members of unions, and ``[key]``)."""
+def _location(steps: Sequence[str | int], data: Any, missing: bool = False) -> Location:
+    """The part of pydantic's location that names keys of the data (it also names members of unions, and ``[key]``).
+
+    ``missing``: its end is a key that the data lack.
+    """
     kept: list[str | int] = []
-    for step in steps:
+    for i, step in enumerate(steps):
         if isinstance(data, dict):
             if step == "[key]":
                 break
+            if step not in data and not (missing and i == len(steps) - 1):
+                continue
             kept.append(step)
             data = data.get(step)
         elif isinstance(data, (list, tuple)) and isinstance(step, int):
             kept.append(step)
             data = data[step] if step < len(data) else None
-        else:
-            break
     return tuple(kept)
 
 
@@ -303,19 +330,41 @@ def _shown(value: Any) -> str:
 
 def _known_keys(section: Location) -> list[str]:
     """Keys of the section at ``section``, as the schema knows them."""
-    model: type[BaseModel] = Job
+    annotation: Any = Job
     for step in section:
-        field = model.model_fields.get(str(step))
-        models = [t for t in _types(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)] if field else []
-        if not models:
-            return []
-        model = models[0]
-    return list(model.model_fields)
+        annotation = _inside(annotation, step)
+    models = [kind for kind in _types(annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)]
+    return list(models[0].model_fields) if models else []
+
+
+def _inside(annotation: Any, step: str | int) -> Any:
+    """The type of what a key, a name or a place in a list leads to."""
+    for inner, kind in inner_types(annotation):
+        if inner:
+            return kind
+        if isinstance(kind, type) and issubclass(kind, BaseModel) and step in kind.model_fields:
+            return kind.model_fields[str(step)].annotation
+    return None
+
+
+def inner_types(annotation: Any) -> Iterator[tuple[str, Any]]:
+    """The members of a type, each with the step that leads to it: none, ``.NAME`` for values of a mapping, ``.N`` for those of a list."""
+    for kind in _types(annotation):
+        if get_origin(kind) is dict:
+            yield from ((".NAME", member) for member in _types(get_args(kind)[1]))
+        elif get_origin(kind) in (list, tuple):
+            yield from ((".N", member) for member in _types(get_args(kind)[0]))
+        else:
+            yield "", kind
 
 
 def _types(annotation: Any) -> Iterator[Any]:
+    """The members of a union, or the type itself; what is annotated is taken bare."""
     if get_origin(annotation) in (Union, UnionType):
-        yield from get_args(annotation)
+        for member in get_args(annotation):
+            yield from _types(member)
+    elif get_origin(annotation) is Annotated:
+        yield from _types(get_args(annotation)[0])
     else:
         yield annotation
 

@@ -1,7 +1,7 @@
-"""What a job will ask of its run, checked before hours of rendering: regions, expressions, rankings."""
+"""What a job will ask of its run, checked before hours of rendering: regions, expressions, rankings, views."""
 
 from collections.abc import Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pipeline.config import Rank
 from pipeline.errors import JobError
@@ -9,6 +9,11 @@ from pipeline.files import checksum
 from pipeline.job_file import LoadedJob
 from pipeline.progress import LOG
 from renderer.scene.arrays import Scene
+from viz.description import JOB_CAMERA
+from viz.tools.base import WalkTool
+
+if TYPE_CHECKING:
+    from queries.lpe import Expression
 
 
 def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
@@ -17,7 +22,7 @@ def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
     Raises JobError with the place in the file. Warnings are given with the scene, once.
     """
     job = loaded.job
-    for section, place in (("aovs", loaded.aov_places), ("rank", loaded.rank_places)):
+    for section, place in (("aovs", loaded.aov_places), ("rank", loaded.rank_places), ("views", loaded.view_places)):
         if place and job.record.share == 0.0:
             raise JobError(
                 f"`{section}` is computed from the tables, and `record.keep: none` keeps none: record all walks or a fraction, or drop `{section}`",
@@ -29,6 +34,7 @@ def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
         problem = _problem(asked, job.regions)
         if problem:
             raise JobError(f"`rank.{name}`: {problem}", loaded.rank_places[name])
+    _check_views(loaded, scene)
 
 
 def region_terms(loaded: LoadedJob) -> dict[str, Any]:
@@ -43,8 +49,7 @@ def region_terms(loaded: LoadedJob) -> dict[str, Any]:
 def _problem(asked: Rank, regions: Collection[str]) -> str | None:
     """Why a ranking cannot be made."""
     if asked.region is not None and asked.region not in regions:
-        known = f"known: {', '.join(regions)}" if regions else "the job has no `regions`"
-        return f"there is no region `{asked.region}` ({known})"
+        return f"there is no region `{asked.region}` ({_known(regions, 'regions')})"
     if asked.region is None and asked.by != "contribution":
         return "without a `region` there is nothing to compare with: expected `by: contribution`"
     if asked.merge and asked.with_objects:
@@ -75,8 +80,42 @@ def _check_regions(loaded: LoadedJob, scene: Scene | None) -> None:
 def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
     """Every AOV's expression compiles, and names what exists."""
     job = loaded.job
-    if not job.aovs:
-        return
+    for name, text in job.aovs.items():
+        expression = _compiled(loaded, scene, text, job.dialect, f"aovs.{name}", loaded.aov_places[name])
+        if {"unoccluded", "shadows"} & set(expression.prefixes) and not job.record.occluded:
+            prefix = next(prefix for prefix in expression.prefixes if prefix in ("unoccluded", "shadows"))
+            raise JobError(f"`aovs.{name}`: `{prefix};` reads blocked connections: add `record: {{occluded: true}}`", loaded.aov_places[name])
+
+
+def _check_views(loaded: LoadedJob, scene: Scene | None) -> None:
+    """Every view's expression compiles, its region, camera and light walks exist."""
+    job = loaded.job
+    for name, view in job.views.items():
+        place, tool = loaded.view_places[name], view.tool
+        key = f"views.{name}.{view.tool_name}"
+        if tool.expression is not None:
+            expression = _compiled(loaded, scene, tool.expression, tool.dialect or job.dialect, f"{key}.expression", place)
+            if set(expression.prefixes) - {"noclamp"}:
+                raise JobError(f"`{key}.expression`: a prefix changes what a path counts, and a view draws paths as they are: leave it out", place)
+        if tool.region is not None and tool.region not in job.regions:
+            raise JobError(f"`{key}.region`: there is no region `{tool.region}` ({_known(job.regions, 'regions')})", place)
+        if isinstance(view.camera, str) and view.camera not in (JOB_CAMERA, *job.cameras):
+            raise JobError(f"`views.{name}.camera`: there is no camera `{view.camera}` ({_known(job.cameras, 'cameras')})", place)
+        if scene and isinstance(tool, WalkTool):
+            _check_walks(loaded, tool, scene, key, place)
+
+
+def _check_walks(loaded: LoadedJob, tool: WalkTool, scene: Scene, key: str, place: str) -> None:
+    """The walks that a tool measures will be recorded."""
+    light = (loaded.job.render.method or scene.defaults.method) == "light"
+    if tool.walks == "light" and not light and loaded.job.inspection is None:
+        raise JobError(f"`{key}` is estimated from light walks: add `inspection: {{samples: 16}}`, or ask for `walks: camera`", place)
+    if tool.walks == "camera" and light:
+        raise JobError(f"`{key}`: `method: light` traces no camera walks: ask for `walks: light`", place)
+
+
+def _compiled(loaded: LoadedJob, scene: Scene | None, text: str, dialect: str, key: str, place: str) -> "Expression":
+    """An expression of the job; with a scene its names are checked, and its warnings are given. Raises JobError."""
     from queries.errors import QueryError
     from queries.lpe import compile
     from queries.lpe.names import kinds_by_name
@@ -84,13 +123,15 @@ def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
     names = None
     if scene:
         names = kinds_by_name((o.name for o in scene.objects), (o.material for o in scene.objects), (e.name for e in scene.emitters))
-    for name, text in job.aovs.items():
-        try:
-            expression = compile(text, job.dialect, objects=names, regions=set(job.regions))
-        except QueryError as error:
-            raise JobError(f"`aovs.{name}`: {error}, in `{text}`", loaded.aov_places[name]) from None
-        if {"unoccluded", "shadows"} & set(expression.prefixes) and not job.record.occluded:
-            prefix = next(prefix for prefix in expression.prefixes if prefix in ("unoccluded", "shadows"))
-            raise JobError(f"`aovs.{name}`: `{prefix};` reads blocked connections: add `record: {{occluded: true}}`", loaded.aov_places[name])
-        for warning in expression.warnings if scene else ():
-            LOG.warning("%s: warning: `aovs.%s`: %s", loaded.aov_places[name], name, warning)
+    try:
+        expression = compile(text, dialect, objects=names, regions=set(loaded.job.regions))
+    except QueryError as error:
+        raise JobError(f"`{key}`: {error}, in `{text}`", place) from None
+    for warning in expression.warnings if scene else ():
+        LOG.warning("%s: warning: `%s`: %s", place, key, warning)
+    return expression
+
+
+def _known(names: Collection[str], section: str) -> str:
+    """What exists of a kind, in words."""
+    return f"known: {', '.join(names)}" if names else f"the job has no `{section}`"

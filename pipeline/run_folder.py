@@ -4,6 +4,9 @@
 
     images/<name>.exr, .png       linear image, and a picture of it
     rankings/<name>.csv, .arrow   classes of paths in a region, ranked
+    views/<name>.png, …           pictures of what light does
+    report/index.html             the offline report
+    inspection/                   the light walks of `inspection`: a run folder of its own
     tables/<table>/<shard>.arrow  recorded tables, a file for each shard
     tables/<catalogue>.arrow      words, objects, events, …
     words/<shard>.arrow           distinct words of each shard
@@ -68,6 +71,16 @@ class RunFolder:
     def ranking(self, name: str, kind: str) -> pathlib.Path:
         """The file of a ranking; ``kind`` is ``csv`` or ``arrow``."""
         return self.path / "rankings" / f"{name}.{kind}"
+
+    @property
+    def views(self) -> pathlib.Path:
+        """The folder of the views."""
+        return self.path / "views"
+
+    @property
+    def report(self) -> pathlib.Path:
+        """The first page of the report."""
+        return self.path / "report" / "index.html"
 
     # --- creating and locking -------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""A run, stage by stage: compile the scene, trace, sum the film, write catalogues and images, compute the AOVs."""
+"""A run, stage by stage: compile the scene, trace, sum the film, write catalogues and images, then answer what the job asks and draw it."""
 
 import contextlib
 import functools
@@ -17,6 +17,7 @@ from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large, ref
 from pipeline.executor import render_shards
 from pipeline.files import FileRecord, checksum, clear_errors, is_whole
 from pipeline.identity import camera, differences, processor, renderer_version, settings_as_json, versions
+from pipeline.inspection import trace_inspection
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.questions import region_terms
@@ -111,6 +112,13 @@ class Run:
             self._write_aovs()
         with self.watch.stage("rankings"):
             self._write_rankings()
+        with self.watch.stage("inspection"):
+            self._trace_inspection()
+        with self.watch.stage("views"):
+            self._write_views()
+        self._save()
+        with self.watch.stage("report"):
+            self._write_report()
         self._save()
         LOG.info("done: %s", self.folder.path)
 
@@ -139,6 +147,7 @@ class Run:
             "status": RENDERING,
             "job": self.job.model_dump(mode="json"),
             "job_file": str(job.file.absolute()),
+            "overrides": list(job.overrides),
             "fingerprint": self.prepared.fingerprint,
             "settings": settings_as_json(self.settings),
             "seed": self.settings.seed,
@@ -150,6 +159,7 @@ class Run:
             "catalogues": old.get("catalogues", {}),
             "images": old.get("images", {}),
             "rankings": old.get("rankings", {}),
+            "views": old.get("views", {}),
             "stats": old.get("stats", {}),
         }
 
@@ -279,6 +289,38 @@ class Run:
                 for name, made in write_rankings(self.folder, self.job, self.regions, self.manifest["rankings"], self.threads, bar):
                     self.manifest["rankings"][name] = made
                     self._save()  # an interrupted job goes on with the next ranking
+
+    def _trace_inspection(self) -> None:
+        """Trace the light walks that the job asks for beside its own."""
+
+        def trace(job: PreparedJob, folder: RunFolder) -> None:
+            LOG.info("tracing light walks for inspection …")
+            watch = Stopwatch()
+            with log_file(folder.path / "log.txt"):
+                Run(job, folder, watch, self.threads, resume=True).go()
+
+        trace_inspection(self.prepared, self.folder, trace)
+
+    def _write_views(self) -> None:
+        """Draw every view; those of other names are left alone."""
+        if self.job.views:
+            from pipeline.views import write_views
+
+            cameras = {name: camera.model_dump(mode="json") for name, camera in self.job.cameras.items()}
+            inspected = self.job.inspection.model_dump(mode="json") if self.job.inspection else None
+            terms = {**self._terms(), "cameras": cameras, "inspection": inspected}
+            with progress("views", len(self.job.views), "views") as bar:
+                for name, drawn in write_views(self.folder, self.job, terms, self.manifest["views"], self.threads, bar):
+                    self.manifest["views"][name] = drawn
+                    self._save()  # an interrupted job goes on with the next view
+
+    def _write_report(self) -> None:
+        """Write the report that the job asks for, anew each time: it tells what is in the folder now."""
+        if self.job.report is not None:
+            from pipeline.report import write_job_report
+
+            LOG.info("writing the report …")
+            write_job_report(self.folder, self.job.report, self.threads)
 
     def _has_layers(self) -> bool:
         """Whether the layered file was written before, of the same images."""

@@ -56,4 +56,6 @@ def summary(manifest: dict[str, Any]) -> Iterator[tuple[str, str]]:
                 f"{name} ({known['asked']['region'] or 'whole image'}, by {known['asked']['by']})" for name, known in manifest["rankings"].items()
             ),
         )
+    if manifest.get("views"):
+        yield "views", ", ".join(f"{name} ({known['tool']})" for name, known in manifest["views"].items())
     yield "versions", ", ".join(f"{name} {version}" for name, version in manifest["versions"].items())

@@ -139,8 +139,8 @@ class Paths:
         self._endpoints = _points(piece, table, "endpoint_")
         self.walks = {side: _walks(piece, table, side, self._technique, eye) for side in ("camera", "light")}
         emitter = np.minimum(piece.column(table, "emitter"), len(emitters.object) - 1)
-        self._infinite: Chosen = emitters.infinite[emitter]
-        self.finite: Chosen = ~self._infinite
+        self.infinite: Chosen = emitters.infinite[emitter]
+        self.finite: Chosen = ~self.infinite
         self.emitter_things: I32 = emitters.object[emitter]
 
     @functools.cached_property
@@ -155,34 +155,47 @@ class Paths:
         return points
 
     @functools.cached_property
+    def camera_points(self) -> F32:
+        """Where the camera is: the point of the lens that was sampled, or that the camera walk left."""
+        camera = self.walks["camera"]
+        points = np.broadcast_to(self._eye, self._endpoints.shape).copy()
+        first = _row_of_depth_0(self._piece, camera, "camera")
+        points[first >= 0] = camera.points[first[first >= 0]]
+        from_light = self._technique == LENS_SAMPLE
+        points[from_light] = self._endpoints[from_light]
+        return points
+
+    @functools.cached_property
     def camera_ends(self) -> F32:
         """Where the camera's end of the path is: its walk's last vertex, or else the lens."""
-        camera = self.walks["camera"]
-        ends = np.broadcast_to(self._eye, self._endpoints.shape).copy()
-        first = _row_of_depth_0(self._piece, camera, "camera")
-        ends[first >= 0] = camera.points[first[first >= 0]]
-        from_light = self._technique == LENS_SAMPLE
-        ends[from_light] = self._endpoints[from_light]
-        return _put_ends(ends, camera)
+        return _put_ends(self.camera_points.copy(), self.walks["camera"])
 
     @functools.cached_property
     def light_ends(self) -> F32:
         """Where the light's end is: its walk's last vertex, or else the emitter."""
         return _put_ends(self.emitter_points.copy(), self.walks["light"])
 
+    @functools.cached_property
+    def before_emitters(self) -> F32:
+        """Where the path is last before its emitter, from the camera outward: the interaction that light meets first, or else the lens."""
+        light = self.walks["light"]
+        return _put_ends(self.camera_ends.copy(), light, 1) if len(light.points) else self.camera_ends
+
+    def ways_to_emitters(self, rows: I64) -> F32:
+        """The unit directions from ``before_emitters`` toward the emitters at infinity of these rows: float32 (rows, 3)."""
+        start, end = self.before_emitters[rows], self.emitter_points[rows]
+        # A light walk left a disk outside the scene: its ray leads there, and on
+        ways = np.where(self._sampled_here[rows, None], end, end - start)
+        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.float32(1e-30))
+        return ways
+
     def last_segments(self) -> tuple[F32, F32]:
         """The segment or ray that leads to each path's emitter: (start, end)."""
-        light = self.walks["light"]
-        start, end = self.camera_ends, self.emitter_points
-        if len(light.points):
-            start = _put_ends(start.copy(), light, 1)
-        infinite = np.flatnonzero(self._infinite)
+        start, end = self.before_emitters, self.emitter_points
+        infinite = np.flatnonzero(self.infinite)
         if len(infinite):
-            # A light walk left a disk outside the scene: its ray leads there, and on
-            ways = np.where(self._sampled_here[infinite, None], end[infinite], end[infinite] - start[infinite])
-            ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.float32(1e-30))
             end = end.copy()
-            end[infinite] = start[infinite] + self._far * ways
+            end[infinite] = start[infinite] + self._far * self.ways_to_emitters(infinite)
         return start, end
 
     @property

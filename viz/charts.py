@@ -1,7 +1,7 @@
 """Charts of plain numbers: error against time, rates and times side by side. Lines and bars carry their own names."""
 
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -180,3 +180,51 @@ def save(figure: Any, path: pathlib.Path) -> None:
     """Write the figure as a PNG."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=DPI)
+
+
+@dataclass(frozen=True)
+class ConvergenceCurve:
+    """Relative standard errors after so many samples of each pixel. ``slope``: fitted to the logarithms of both, None where it is not known."""
+
+    samples: Sequence[int]
+    error: Sequence[float]
+    slope: float | None
+
+
+def convergence_chart(path: pathlib.Path, curve: ConvergenceCurve, title: str) -> None:
+    """Relative error over samples, both logarithmic, beside the line that independent samples follow. Writes a PNG."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    figure, axes = new_chart((8.4, 4.2), title)
+    axes.set_xscale("log", base=2)
+    axes.set_yscale("log")
+    middle = len(curve.samples) // 2
+    start = curve.error[middle] * (curve.samples[middle] / curve.samples[0]) ** 0.5
+    ends = (curve.samples[0], curve.samples[-1])
+    axes.plot(ends, (start, start * (ends[0] / ends[1]) ** 0.5), "--", color="#8a8a8a", linewidth=1.0, zorder=2, label="slope −1/2: independent samples")
+    fitted = "" if curve.slope is None else f", fitted slope {curve.slope:.2f}".replace("-", "−")
+    axes.plot(curve.samples, curve.error, "-o", color=COLORS[0], linewidth=1.8, markersize=4, zorder=3, label=f"this run{fitted}")
+    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
+    axes.grid(True, color=FAINT, linewidth=0.6, zorder=1)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g} %"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("samples of each pixel")
+    axes.set_ylabel("relative standard error")
+    save(figure, path)
+
+
+def seconds_chart(path: pathlib.Path, stages: Mapping[str, float], title: str) -> None:
+    """Seconds of each stage as horizontal bars, in the order in which they ran. Writes a PNG."""
+    figure, axes = new_chart((8.4, 0.9 + 0.36 * len(stages)), title)
+    for i, taken in enumerate(stages.values()):
+        axes.barh(i, taken, color=COLORS[0], height=0.62)
+        axes.annotate(f"{taken:.2f} s", (taken, i), (6, 0), textcoords="offset points", va="center", color=INK, fontsize=9)
+    axes.set_yticks(range(len(stages)), list(stages))
+    axes.invert_yaxis()
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_xlabel("wall time (s)")
+    axes.margins(x=0.12)
+    save(figure, path)

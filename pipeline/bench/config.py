@@ -5,7 +5,7 @@ import json
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import yaml
 from pydantic import Field, ValidationError, model_validator
@@ -13,7 +13,8 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.config import NAME_PATTERN, Section
 from pipeline.errors import JobError
 
-SectionName = Literal["rates", "size", "memory", "error", "start", "features", "questions"]
+SectionName = Literal["rates", "size", "memory", "error", "start", "features", "questions", "pictures"]
+_NO_QUESTIONS = ("aovs={}", "rank={}", "views={}", "inspection=null", "report=null")
 ContenderName = Literal["independent", "sobol", "recorded", "recorded_sobol", "mitsuba_llvm", "mitsuba_scalar"]
 
 
@@ -66,6 +67,16 @@ class Questions(Section):
     memory_samples: int = Field(default=0, ge=0, description="Samples for each pixel of a longer run, for the questions' peak memory; 0: none.")
 
 
+class Pictures(Section):
+    """Bundling and drawing paths of a run of the job that records every path."""
+
+    paths: int = Field(default=100_000, ge=1, le=10_000_000, description="Paths that are chosen, bundled and drawn.")
+    points: int = Field(default=24, ge=3, le=256, description="Points of each curve.")
+    size: Annotated[tuple[int, int], Field(strict=False)] = Field(default=(1920, 1080), description="Width and height of the picture, pixels.")
+    most_bundling_seconds: float = Field(default=2.0, gt=0, description="The goal for bundling, seconds.")
+    most_drawing_seconds: float = Field(default=15.0, gt=0, description="The goal for drawing, seconds.")
+
+
 class Benchmark(Section):
     """A benchmark file. Paths in it are relative to the file."""
 
@@ -83,6 +94,7 @@ class Benchmark(Section):
     error: Error = Field(default=Error(), description="Error against time.")
     features: Features = Field(default=Features(), description="The cost of absent features.")
     questions: Questions = Field(default=Questions(), description="Questions of a recorded run.")
+    pictures: Pictures = Field(default=Pictures(), description="Pictures of bundled paths.")
     out: str | None = Field(
         default=None, min_length=1, description="The folder of the results. Default: `runs/bench-<name>` where the command is run."
     )
@@ -102,8 +114,8 @@ class LoadedBenchmark:
 
     @property
     def overrides(self) -> list[str]:
-        """The changes to the job as ``key=value``, AOVs and rankings left out: they are questions about a render, not part of it."""
-        return [*(f"{key}={json.dumps(value)}" for key, value in self.benchmark.settings.items()), "aovs={}", "rank={}"]
+        """The changes to the job as ``key=value``, what it asks of the render left out: that is no part of it."""
+        return [*(f"{key}={json.dumps(value)}" for key, value in self.benchmark.settings.items()), *_NO_QUESTIONS]
 
     def folder(self, out: pathlib.Path | None) -> pathlib.Path:
         """Where the results go: the argument, else the file's ``out``, else ``runs/bench-<name>`` here."""

@@ -25,7 +25,7 @@ def measure_questions(session: Session) -> SectionResult:
     """Ask a recorded run each question in rounds; then ask a longer run once, for its memory."""
     asked = session.benchmark.questions
     result = SectionResult()
-    with _recorded(session, session.settings.passes) as folder, _worker(session, folder) as worker:
+    with recorded(session, session.settings.passes) as folder, _worker(session, folder) as worker:
         paths = folder.paths
         contenders: dict[str, Callable[[int], Timing]] = {q.what: _ask(worker, q) for q in asked.ask}
         if asked.regex:
@@ -50,13 +50,13 @@ def measure_questions(session: Session) -> SectionResult:
 # --- asking -------------------------------------------------------------------------------------------------------
 
 
-class _recorded:
+class recorded:
     """A recorded run of so many samples, removed in the end."""
 
     def __init__(self, session: Session, samples: int) -> None:
         self.session, self.samples, self.path = session, samples, session.scratch / "questions"
 
-    def __enter__(self) -> "_recorded":
+    def __enter__(self) -> "recorded":
         LOG.info("recording %d samples …", self.samples)
         overrides = [*self.session.loaded.overrides, "record.keep=all", f"render.samples={self.samples}"]
         run_job(self.session.loaded.job, overrides, self.path, threads=self.session.benchmark.threads)
@@ -67,7 +67,7 @@ class _recorded:
         shutil.rmtree(self.path, ignore_errors=True)
 
 
-def _worker(session: Session, folder: _recorded) -> Worker:
+def _worker(session: Session, folder: recorded) -> Worker:
     return Worker("pipeline.bench.questions_worker", [str(folder.path), str(session.benchmark.threads)], session.logs / "questions.log")
 
 
@@ -138,7 +138,7 @@ def _table(session: Session, walls: dict[str, list[float]], others: list[str], p
 def _measure_memory(session: Session, result: SectionResult) -> None:
     """The most memory that each question takes on a long run, each in a process of its own."""
     peaks: dict[str, int] = {}
-    with _recorded(session, session.benchmark.questions.memory_samples) as folder:
+    with recorded(session, session.benchmark.questions.memory_samples) as folder:
         for question in session.benchmark.questions.ask:
             with _worker(session, folder) as worker:
                 worker.ask(**_request(question))

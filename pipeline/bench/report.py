@@ -24,6 +24,7 @@ TITLES = {
     "start": "Start-up",
     "features": "Absent features",
     "questions": "Questions",
+    "pictures": "Pictures",
 }
 
 

@@ -9,6 +9,7 @@ from pipeline.bench.contenders import Contenders
 from pipeline.bench.error import measure_error
 from pipeline.bench.features import measure_features
 from pipeline.bench.memory import measure_memory
+from pipeline.bench.pictures import measure_pictures
 from pipeline.bench.questions import measure_questions
 from pipeline.bench.rates import measure_rates
 from pipeline.bench.report import TITLES, machine, print_rows, write_report
@@ -29,6 +30,7 @@ SECTIONS: dict[str, Callable[[Session], SectionResult]] = {
     "start": measure_start,
     "features": measure_features,
     "questions": measure_questions,
+    "pictures": measure_pictures,
 }
 
 

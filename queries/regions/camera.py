@@ -47,6 +47,15 @@ class Camera:
         project(points, self.to_camera, self.film, raster, before)
         return raster, before
 
+    def rays(self, raster: F64) -> F32:
+        """Unit directions (n, 3), world, from ``origin`` through film positions (n, 2) in pixels: what ``raster`` undoes."""
+        tangents, shifts, size = self.film[0:2], self.film[2:4], self.film[4:6]
+        across = tangents * (1 - 2 * (raster / size + shifts))
+        local = np.column_stack([across, np.ones(len(across))])
+        # rows of an orthonormal matrix: its inverse is its transpose
+        world: F32 = (local @ self.to_camera[:, :3] / np.linalg.norm(local, axis=1, keepdims=True)).astype(np.float32)
+        return world
+
     def frustum(self, low: F64, high: F64) -> F64:
         """The planes (6, 4), inner side positive, around all that is before the camera and seen between film positions ``low`` and ``high`` (2,)."""
         tangents, shifts, size = self.film[0:2], self.film[2:4], self.film[4:6]

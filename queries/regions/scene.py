@@ -97,6 +97,11 @@ class SceneGeometry:
         return self.once("caster", lambda: RayCaster(*self._surfaces(None)))
 
     @property
+    def primitive_objects(self) -> I32:
+        """The object of each primitive of ``caster``."""
+        return self.once("owner", self._owner)
+
+    @property
     def extent(self) -> float:
         """The diagonal of the bounds of all surfaces and the camera, world units: no two of them are farther apart."""
         return self.once("extent", self._extent)
@@ -108,7 +113,7 @@ class SceneGeometry:
     def closest(self, origins: F32, directions: F32, far: F32) -> tuple[I32, F32]:
         """The object that each ray meets first before ``far`` (n,), ``NO_OBJECT`` where none, and the distance, in units of the direction (n, 3)."""
         primitive, t = self.caster.closest(origins, directions, far)
-        owner = self.once("owner", self._owner)
+        owner = self.primitive_objects
         return np.where(primitive >= 0, owner[primitive], NO_OBJECT).astype(np.int32), t
 
     # --- from the catalogues ------------------------------------------------------------------------------------------
@@ -128,7 +133,7 @@ class SceneGeometry:
         kinds, to_world = self._quadrics()
         if key is None:
             return corners, kinds, to_world
-        owner = self.once("owner", self._owner)
+        owner = self.primitive_objects
         mine, curved = owner[: len(corners)] == key, owner[len(corners) :] == key
         return corners[mine], kinds[curved], to_world[curved]
 

@@ -38,9 +38,10 @@ class ColorBar:
 class Drawn:
     """What a tool drew.
 
-    ``caption``: what is seen, in one to three sentences; ``legend``: names of colors; ``figures``: quantities, with the unit in the name; ``frames``: each
-    sets the stage for one picture of a sequence (none: one picture); ``frame_seconds``: how long each is shown; ``image``: uint8 (height, width, 3), a
-    picture made in image space, instead of the stage's; ``meshes``: what can be exported (VTP, glTF), with its attributes. ``empty``: nothing was selected.
+    ``caption``: what is seen, in one to three sentences; ``legend``: names of colors; ``figures``: quantities, with the unit in the name; ``frames``:
+    each sets the stage for one picture of a sequence (none: one picture); ``frame_notes``: a line of text for each; ``frame_seconds``: how long
+    each is shown; ``image``: uint8 (height, width, 3), a picture made in image space, instead of the stage's; ``meshes``: what can be exported (VTP,
+    glTF), with its attributes. ``empty``: nothing was selected.
     """
 
     caption: str
@@ -48,6 +49,7 @@ class Drawn:
     color_bar: ColorBar | None = None
     figures: Mapping[str, float | int | str] = field(default_factory=dict)
     frames: tuple[Callable[[], None], ...] = ()
+    frame_notes: tuple[str, ...] = ()
     frame_seconds: float = 0.08
     image: U8 | None = None
     meshes: "Mapping[str, pyvista.PolyData]" = field(default_factory=dict)
@@ -80,3 +82,13 @@ class Tool(Part):
     @abstractmethod
     def draw(self, run: "Run", stage: "Stage") -> Drawn:
         """Draw onto the stage. The same run gives the same picture. Raises ``QueryError``."""
+
+
+class WalkTool(Tool):
+    """A tool that measures walks on their way: light, or the importance of camera walks."""
+
+    walks: Literal["light", "camera"] = Field(
+        default="light",
+        description="`light`: what arrives from emitters, which needs a run of `method: light` or the job's `inspection`. "
+        "`camera`: importance, what matters to the image.",
+    )

@@ -1,0 +1,44 @@
+"""The pass for inspection: light walks beside a run of camera walks, in a run folder of their own inside the run's."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from pipeline.config import Images
+from pipeline.identity import differences, fingerprint
+from pipeline.prepare import PreparedJob
+from pipeline.run_folder import RunFolder
+from queries.inspection import FOLDER
+
+
+def inspection_folder(folder: RunFolder) -> RunFolder:
+    """Where the pass lies."""
+    return RunFolder(folder.path / FOLDER)
+
+
+def inspection_job(prepared: PreparedJob) -> PreparedJob | None:
+    """The pass as a job of its own: the same scene and film, light walks, all kept; None where none is asked for, or the run traces light itself."""
+    asked = prepared.loaded.job.inspection
+    if asked is None or prepared.settings.method == "light":
+        return None
+    settings = replace(prepared.settings, method="light", passes=asked.samples, keep=1.0, columns=frozenset(), occluded=False)
+    job = prepared.loaded.job
+    bare: dict[str, Any] = {"aovs": {}, "rank": {}, "views": {}, "report": None, "inspection": None, "images": Images()}
+    render = job.render.model_copy(update={"method": "light", "samples": asked.samples})
+    loaded = replace(prepared.loaded, job=job.model_copy(update={**bare, "render": render}))
+    return PreparedJob(loaded, prepared.scene, settings, fingerprint(settings, prepared.scene))
+
+
+def trace_inspection(prepared: PreparedJob, folder: RunFolder, run: Callable[[PreparedJob, RunFolder], None]) -> bool:
+    """Trace the pass that the job asks for with ``run``, or go on with it; one of other settings is replaced. Returns whether there is one."""
+    job = inspection_job(prepared)
+    if job is None:
+        return False
+    inner = inspection_folder(folder)
+    old = inner.manifest()
+    if old is not None and differences(old.get("fingerprint", {}), job.fingerprint):
+        shutil.rmtree(inner.path)
+    with inner.locked():
+        run(job, inner)
+    return True

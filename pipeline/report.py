@@ -1,0 +1,32 @@
+"""The offline report of a run: what the job asks for, and `pathspace report`."""
+
+import pathlib
+import tempfile
+from collections.abc import Mapping
+from typing import Any
+
+from pipeline.config import Report
+from pipeline.run_folder import RunFolder
+from queries.run import open_run
+
+
+def write_job_report(folder: RunFolder, asked: Report, threads: int | None, out: pathlib.Path | None = None) -> pathlib.Path:
+    """Write the report of a finished run into ``report/`` of its folder, or into ``out``; returns its page. Raises QueryError."""
+    from viz.report import draw_classes, model_of_paths, write_report
+
+    with open_run(folder.path, threads=threads) as run, tempfile.TemporaryDirectory(prefix="pathspace-") as name:
+        pictures, recorded = pathlib.Path(name), run.settings["keep"] > 0
+        models = [model_of_paths(run, asked.paths, pictures)] if asked.paths and recorded else []
+        draw = draw_classes(run, pictures) if asked.top else None
+        return write_report(run, out or folder.report.parent, models=models, draw=draw, top=asked.top, threads=threads)
+
+
+def print_report(path: pathlib.Path, out: pathlib.Path | None, given: Mapping[str, Any]) -> None:
+    """Write a run's report as its job describes it, or a plain one, with what is ``given`` instead, and print where it is.
+
+    Raises JobError and QueryError.
+    """
+    folder = RunFolder(path)
+    with open_run(path) as run:
+        described = (run.manifest.get("job") or {}).get("report") or {}
+    print(write_job_report(folder, Report.model_validate({**described, **given}), None, out))

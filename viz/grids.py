@@ -1,0 +1,71 @@
+"""The grid of voxels that a tool measures light in, as a job describes it."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from queries.errors import QueryError
+from queries.regions.description import Part, Position
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from queries.fluence import Grid
+    from queries.run import Run
+
+Resolution = Annotated[int, Field(ge=8, le=256)]
+
+
+class Corners(Part):
+    """A box along the axes."""
+
+    min: Position = Field(description="The corner of least coordinates, world units.")
+    max: Position = Field(description="The corner of largest coordinates, world units: each above that of `min`.")
+
+    @model_validator(mode="after")
+    def _some_volume(self) -> "Corners":
+        if not all(low < high for low, high in zip(self.min, self.max)):
+            raise ValueError("expected each coordinate of `max` above that of `min`")
+        return self
+
+
+BoxField = Annotated[
+    Corners | str | None,
+    Field(description="Where light is measured: `min` and `max`, world units, or a box or a ball of `regions`. Default: the whole scene."),
+]
+
+
+def grid_of(run: "Run", box: Corners | str | None, resolution: int) -> "Grid":
+    """A grid of ``resolution`` voxels along its longest side, cubes if the box allows. Raises ``QueryError`` for a region that is no box."""
+    from queries.fluence import Grid
+
+    if box is None:
+        return Grid.around(run.geometry, resolution)
+    low, high = (np.array(box.min), np.array(box.max)) if isinstance(box, Corners) else _bounds(run, box)
+    size = high - low
+    x, y, z = np.maximum(np.rint(size / (size.max() / resolution)), 1).astype(int).tolist()
+    return Grid(_triple(low), _triple(high), (x, y, z))
+
+
+def _bounds(run: "Run", name: str) -> "tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]":
+    """The least and largest coordinates of a region."""
+    from queries.regions import Box, Sphere
+
+    if name not in run.regions:
+        known = ", ".join(run.regions) or "none"
+        raise QueryError(f"there is no region `{name}` for `box`: expected one of the job's regions ({known}), or `min` and `max`")
+    region = run.regions[name]
+    if isinstance(region, Sphere):
+        half = np.full(3, region.radius)
+    elif isinstance(region, Box):
+        half = np.abs(region.axes().T) @ np.array(region.size) / 2  # of a turned box: what contains it
+    else:
+        raise QueryError(f"expected a box or a ball for `box`, found region `{name}`, which is {region.describe()}: give `min` and `max`")
+    center = np.array(region.center, np.float64)
+    return center - half, center + half
+
+
+def _triple(values: "npt.NDArray[np.float64]") -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
