@@ -10,7 +10,7 @@ from pipeline.errors import JobError
 from pipeline.files import clear_errors
 from pipeline.images import F32, write_exr, write_png
 from queries.images import select
-from queries.kernels.luminance import LUMINANCE
+from queries.luminance import luminance_of
 from queries.regions import parse_region
 from queries.run import Run, open_run
 from queries.sql import TIME_LIMIT, stream, write
@@ -59,4 +59,4 @@ def _write_image(path: pathlib.Path, pixels: F32, run: Run, expression: str) -> 
 
 
 def _mean_luminance(pixels: F32) -> float:
-    return float(pixels.mean(axis=(0, 1), dtype=np.float64) @ np.array(LUMINANCE))
+    return float(luminance_of(pixels.mean(axis=(0, 1), dtype=np.float64)))

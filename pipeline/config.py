@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from queries.regions import RegionDescription, RegionName
 from renderer.scene.sensors import LARGEST_FILM
 from renderer.settings import UNBOUNDED_DEPTH
-from viz.cameras import CameraDescription
-from viz.description import JOB_CAMERA, View
+from viz.cameras import JOB_CAMERA, CameraDescription
+from viz.description import View
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 

@@ -9,7 +9,7 @@ from pipeline.files import checksum
 from pipeline.job_file import LoadedJob
 from pipeline.progress import LOG
 from renderer.scene.arrays import Scene
-from viz.description import JOB_CAMERA
+from viz.cameras import JOB_CAMERA
 from viz.tools.base import WalkTool
 
 if TYPE_CHECKING:

@@ -320,7 +320,7 @@ class Run:
             from pipeline.report import write_job_report
 
             LOG.info("writing the report …")
-            write_job_report(self.folder, self.job.report, self.threads)
+            write_job_report(self.folder, self.job.report, self.threads, scene=self.scene)
 
     def _has_layers(self) -> bool:
         """Whether the layered file was written before, of the same images."""

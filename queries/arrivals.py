@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from queries.by_vertices import sensor_origin
 from queries.errors import QueryError
+from queries.horizon import Horizon
 from queries.kernels.arrivals import WalkAutomaton, fold_arrivals, keep_reached
 from queries.kernels.vertices import Vertices
 from queries.lpe import Expression
@@ -84,10 +85,16 @@ class Arrivals:
     def segments(self, piece: Piece, rows: I64) -> tuple[F32, F32]:
         """The segments that lead to these rows (depth 1 and more): start and end, float32 (k, 3) each, world units.
 
-        A row that escaped ends where it leaves the sphere of radius ``geometry.extent`` around the scene's center, or twice as far from there as its
-        segment starts, if that is more. A walk from an infinite emitter begins on a disk beside the scene.
+        A row that escaped ends at the scene's ``Horizon``. A walk from an infinite emitter begins on a disk beside the scene.
         """
         return self._walks.segments(piece, rows)
+
+    def reach(self) -> tuple[F64, float]:
+        """Where all light is known: in the ball of this center (3,) and radius, world units; beyond it, meters would show too little.
+
+        Emitters at infinity send their walks into the ball around the surfaces, and others are followed as far as ``segments`` says.
+        """
+        return self._walks.reach()
 
 
 class Walks:
@@ -118,10 +125,23 @@ class Walks:
         end = self.points(piece)[rows]
         gone = np.flatnonzero(piece.column(self.table, "event")[rows] == ESCAPED)
         if len(gone):
-            geometry = self._run.geometry
-            center = geometry.once("center", lambda: _center(self._run))
-            end[gone] = _leave(start[gone], way[gone], center, geometry.extent)
+            end[gone] = self._horizon().leave(start[gone], way[gone])
         return start, end
+
+    def reach(self) -> tuple[F64, float]:
+        """See ``Arrivals.reach``."""
+        horizon = self._horizon()
+        if self.beginnings is None or self.beginnings.far not in self.beginnings.emitters:
+            return horizon.center, horizon.radius
+        try:
+            low, high = self._run.geometry.caster.bounds
+        except QueryError:  # surfaces that are not stored: any point may be among them
+            return horizon.center, np.inf
+        return horizon.center, float(np.linalg.norm(high - low)) / 2
+
+    def _horizon(self) -> Horizon:
+        geometry = self._run.geometry
+        return geometry.once("horizon", lambda: Horizon.of(geometry))
 
     def began_in(self, piece: Piece, film: FilmArea) -> Chosen:
         """Whether the center of the pixel that each row's camera walk began in lies in an area of the film."""
@@ -298,27 +318,3 @@ def _seen_in(film: FilmArea | None) -> Polygon | None:
         return None
     left, top, right, bottom = film
     return Polygon((((left, top), (right, top), (right, bottom), (left, bottom)),))
-
-
-def _center(run: Run) -> F64:
-    """Of the bounds of all surfaces and the camera, whose diagonal is the scene's extent."""
-    geometry = run.geometry
-    try:
-        points = [geometry.caster.bounds]
-        if run.manifest.get("camera"):
-            points.append(geometry.camera.origin[None])
-    except QueryError:
-        return np.zeros(3)
-    everything = np.concatenate(points)
-    center: F64 = (everything.min(axis=0) + everything.max(axis=0)) / 2
-    return center
-
-
-def _leave(start: F32, direction: F32, center: F64, radius: float) -> F32:
-    """Where rays leave a sphere: one of ``radius``, or of twice their own distance from its center."""
-    o, d = start.astype(np.float64) - center, direction.astype(np.float64)
-    a, b, c = (np.einsum("ij,ij->i", x, y) for x, y in ((d, d), (o, d), (o, o)))
-    a = np.maximum(a, 1e-30)
-    t = (np.sqrt(b * b + a * (np.maximum(radius * radius, 4 * c) - c)) - b) / a
-    end: F32 = (start + t[:, None] * d).astype(np.float32)
-    return end

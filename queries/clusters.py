@@ -14,7 +14,7 @@ import numpy.typing as npt
 from queries.arrivals import Arrivals, Beginnings
 from queries.errors import QueryError
 from queries.inspection import walks_of
-from queries.probes import Passing, Probe, passing
+from queries.probes import Passing, Probe, passing, require_reach
 from queries.run import Run
 from queries.selection import Selection
 from queries.shards import Piece, map_shards
@@ -83,12 +83,14 @@ def clusters(
 
     ``groups``: names of objects that count as one, by the group's name; ``threshold``: the least share of an arrow; ``history``: how many
     levels. Goes over the walks twice, once for sums and once for the starts nearest to the means. The sums have the same bits on any number of
-    threads. Raises ``QueryError`` where the run has no such walks, for unknown objects, and for objects in two groups.
+    threads. Raises ``QueryError`` where the run has no such walks, for unknown objects, for objects in two groups, and for a probe beyond where
+    light is known.
     """
     if not 0 <= threshold < 1 or not 1 <= history <= MOST_HISTORY:
         raise QueryError(f"expected a threshold of 0 or more and below 1, and a history of 1 to {MOST_HISTORY}, found {threshold} and {history}")
     with walks_of(run, side) as found:
         arrivals, units = Arrivals(found, selection, side), Units.of_run(found)
+        require_reach(arrivals, probe)
         kinds = _Kinds(found, side, groups or {}, history)
         files, threads = found.files(*arrivals.tables), threads or found.threads
         trees = list(map_shards(files, functools.partial(_sum_shard, arrivals, units, probe, kinds, history), threads))

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.arrivals import Arrivals
-from queries.fluence import Grid, deposit, throughput
 from queries.kernels.flow import advance
-from queries.kernels.luminance import LUMINANCE
+from queries.luminance import luminance_of
 from queries.run import Run
 from queries.selection import Selection
 from queries.shards import Piece
+from queries.voxels import Grid, deposit, throughput
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -139,12 +139,12 @@ def _flowing(table: str, piece: Piece, rows: I64, start: F32, end: F32) -> F64:
     """What segments deposit for each unit of their length: luminance times direction, and luminance; float64 (rows, 4)."""
     way = end.astype(np.float64) - start
     way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    light = throughput(table, piece, rows, start, end).astype(np.float64) @ np.array(LUMINANCE)
+    light = luminance_of(throughput(table, piece, rows, start, end))
     found: F64 = light[:, None] * np.column_stack([way, np.ones(len(rows))])
     return found
 
 
 def _passing(table: str, piece: Piece, rows: I64, start: F32, end: F32) -> F64:
     """The same: color, and squared luminance; float64 (rows, 4)."""
-    rgb = throughput(table, piece, rows, start, end).astype(np.float64)
-    return np.column_stack([rgb, (rgb @ np.array(LUMINANCE)) ** 2])
+    rgb = throughput(table, piece, rows, start, end)
+    return np.column_stack([rgb, luminance_of(rgb) ** 2])

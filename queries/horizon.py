@@ -1,4 +1,4 @@
-"""Where pictures end: light that comes from infinity, or leaves for it, is drawn as far as a sphere around the scene."""
+"""Where the scene ends: light that comes from infinity, or leaves for it, is followed as far as a sphere around the scene."""
 
 from dataclasses import dataclass
 
@@ -29,9 +29,12 @@ class Horizon:
         return cls((low + high) / 2, geometry.extent)
 
     def leave(self, points: F32, ways: F32) -> F32:
-        """Where rays from ``points`` (n, 3) along unit ``ways`` (n, 3) leave the sphere; from outside it, the point at a distance of ``radius``."""
+        """Where rays from ``points`` (n, 3) along ``ways`` (n, 3) leave the sphere, or one of twice their own distance from its center, if that is
+        more: rays of lights that stand beside all surfaces are not cut short.
+        """
         offset, way = points.astype(np.float64) - self.center, ways.astype(np.float64)
-        along, beyond = np.sum(offset * way, axis=1), np.sum(offset * offset, axis=1) - self.radius**2
-        distance = np.where(beyond > 0, self.radius, -along + np.sqrt(np.maximum(along * along - beyond, 0.0)))
-        left: F32 = (points + distance[:, None] * way).astype(np.float32)
+        a, b, c = (np.einsum("ij,ij->i", x, y) for x, y in ((way, way), (offset, way), (offset, offset)))
+        a = np.maximum(a, 1e-30)
+        t = (np.sqrt(b * b + a * (np.maximum(self.radius**2, 4 * c) - c)) - b) / a
+        left: F32 = (points + t[:, None] * way).astype(np.float32)
         return left

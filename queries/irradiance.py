@@ -16,8 +16,8 @@ import numpy.typing as npt
 from queries.arrivals import Arrivals
 from queries.errors import QueryError
 from queries.inspection import walks_of
-from queries.kernels.luminance import LUMINANCE
 from queries.kernels.meters import EMPTY, add_to_patches, fill_keys, fill_slots, smooth
+from queries.luminance import luminance_of
 from queries.patches import MOST_PATCHES, Patches, patches, surface_area
 from queries.regions.rays import RayCaster
 from queries.run import Run
@@ -93,7 +93,7 @@ def irradiance(
         walks = found.settings["passes"] * found.settings["width"] * found.settings["height"]
     area = np.where(patches.area > 0, patches.area, np.inf)
     mean = total.sums * arrivals.per_walk
-    variance = total.squares * arrivals.per_walk**2 - (mean @ LUMINANCE) ** 2 / walks
+    variance = total.squares * arrivals.per_walk**2 - luminance_of(mean) ** 2 / walks
     overall = units.jackknife(lambda sums: sums * arrivals.per_walk, total.units)
     return Irradiance(
         (mean / area[:, None]).astype(np.float32),
@@ -191,7 +191,7 @@ def _sum_shard(arrivals: Arrivals, patches: Patches, faces: Faces, units: Units,
         walks, (r, g, b) = piece.column(table, "walk"), (piece.column(table, f"throughput_{c}") for c in "rgb")
         add_to_patches(walks, rows, patch, r, g, b, total.sums, total.squares, total.hits)
         kept = rows[patch >= 0]
-        brought = sum(weight * channel[kept].astype(np.float64) for weight, channel in zip(LUMINANCE, (r, g, b)))
+        brought = luminance_of(np.stack([channel[kept] for channel in (r, g, b)], axis=1))
         total.units[:] += np.bincount(units.of_walks(walks[kept]), weights=brought, minlength=units.count)
         piece.forget()
     return total

@@ -29,8 +29,8 @@ class Patches:
     """``p`` patches, in the order of the scene's primitives.
 
     ``object``: int32 (p), keys; ``area``: float64 (p), world units²; ``center``, ``normal``: float32 (p, 3), the normal toward the surface's
-    front. To draw: ``corners``, float32 (t, 3, 3), triangles, and ``patch``, int32 (t), which patch each is of. ``facets``, ``grid``: what
-    finds the patches of points.
+    front (as it is without ``flip_normals``, which tables do not keep). To draw: ``corners``, float32 (t, 3, 3), triangles, and ``patch``,
+    int32 (t), which patch each is of. ``facets``, ``grid``: what finds the patches of points.
     """
 
     corners: F32

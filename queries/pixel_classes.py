@@ -17,7 +17,7 @@ from queries.kernels.pixel_classes import NO_CLASS, cells_and_values, deposit, l
 from queries.lpe.class_words import describe_class
 from queries.lpe.descriptors import class_expression, descriptor
 from queries.run import Run
-from queries.shards import Array, Piece, map_shards
+from queries.shards import Piece, map_shards
 
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
@@ -68,10 +68,10 @@ def cell_size(width: int, height: int, most: int = MOST_CELLS) -> int:
 
 
 def pixel_classes(run: Run, named: int = NAMED, most: int = MOST_CELLS, threads: int | None = None) -> PixelClasses:
-    """The largest classes of each pixel of a run, or of each block where the film has more than ``most`` pixels; the same bits on any number of threads.
+    """The largest classes of each pixel of a run, or of each block where the film has more than ``most`` pixels: the same on any number of threads.
 
-    ``named``: how many classes are told apart at most (below 255), those of most luminance. Three passes over the paths; memory: 8 bytes for each cell and
-    named class. Raises ``QueryError`` for a run without paths, or of which only some shards are open.
+    ``named``: how many classes are told apart at most (below 255), those of most luminance. Three passes over the paths; memory: 8 bytes for each
+    cell and named class. Raises ``QueryError`` for a run without paths, or of which only some shards are open.
     """
     run.require_paths("no pixel's classes can be told")
     run.require_whole()
@@ -127,7 +127,7 @@ def _sums(run: Run, found: PathClasses, layers: U8, grid: tuple[int, int, int], 
 
 def _cells(piece: Piece, block: int, columns: int) -> tuple[I32, F64]:
     """The cell of each path, and its luminance."""
-    light: list[Array] = [piece.column("paths", name) for name in _LIGHT]
+    x, y, r, g, b = (piece.column("paths", name) for name in _LIGHT)
     cell, value = np.empty(piece.rows("paths"), np.int32), np.empty(piece.rows("paths"))
-    cells_and_values(*light, block, columns, cell, value)
+    cells_and_values(x, y, r, g, b, block, columns, cell, value)
     return cell, value

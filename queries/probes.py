@@ -18,8 +18,8 @@ import numpy.typing as npt
 from queries.arrivals import Arrivals
 from queries.errors import QueryError
 from queries.inspection import walks_of
-from queries.kernels.luminance import LUMINANCE
 from queries.kernels.meters import chords_of_ball, through_disk
+from queries.luminance import luminance_of
 from queries.regions.rays import TOUCH
 from queries.run import Run
 from queries.selection import Selection
@@ -146,13 +146,15 @@ class Incident:
 def incident(run: Run, selection: Selection, probe: Probe, resolution: int = 16, side: str = "light", threads: int | None = None) -> Incident:
     """Selected light at a probe, by direction. ``resolution``: bands from pole to pole (a disk has half as many), with twice as many sectors.
 
-    The sums have the same bits on any number of threads. Raises ``QueryError`` where the run has no such walks, or the expression does not fit them.
+    The sums have the same bits on any number of threads. Raises ``QueryError`` where the run has no such walks, the expression does not fit them,
+    or the probe lies beyond where light is known.
     """
     if not 2 <= resolution <= MOST_BANDS:
         raise QueryError(f"expected a resolution of 2 to {MOST_BANDS} bands of directions, found {resolution}")
     bands, sectors = resolution if probe.normal is None else resolution // 2, 2 * resolution
     with walks_of(run, side) as found:
         arrivals, units = Arrivals(found, selection, side), Units.of_run(found)
+        require_reach(arrivals, probe)
         sums, noise, count = np.zeros((bands * sectors, 3)), np.zeros((bands * sectors, units.count)), 0
         work = functools.partial(_sum_shard, arrivals, units, probe, bands, sectors)
         for more, scattered, rows in map_shards(found.files(*arrivals.tables), work, threads or found.threads):
@@ -186,8 +188,19 @@ class Passing:
     @property
     def luminance(self) -> F64:
         """The luminance of the flux."""
-        found: F64 = self.flux @ LUMINANCE
-        return found
+        return luminance_of(self.flux)
+
+
+def require_reach(arrivals: Arrivals, probe: Probe) -> None:
+    """Raise ``QueryError`` for a probe beyond where all light is known (``Arrivals.reach``): it would measure too little."""
+    center, radius = arrivals.reach()
+    farthest = float(np.linalg.norm(np.array(probe.position) - center)) + probe.radius
+    if farthest > radius * (1 + 1e-4) + TOUCH * float(np.abs(center).max()):
+        x, y, z = center.tolist()
+        raise QueryError(
+            f"expected a probe within {radius:.4g} of ({x:.4g}, {y:.4g}, {z:.4g}), where all light is known, found one that reaches {farthest:.4g} "
+            "from there: move it or make it smaller, or add a surface to the scene beyond it, as light from infinity is traced around surfaces alone"
+        )
 
 
 def passing(arrivals: Arrivals, units: Units, probe: Probe, piece: Piece) -> Passing:

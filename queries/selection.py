@@ -14,9 +14,9 @@ FilmArea = tuple[float, float, float, float]
 class Selection:
     """Light that passes all three.
 
-    Of whole paths: ``expression`` matches the path, some interaction of it lies in ``region``, and it falls on the film inside ``film`` (pixels: left,
-    top, right, bottom, half open). Of a walk on its way (``queries.arrivals``): the vertex that light arrives at stands for the walk's other end, so
-    that `C L` is direct light and `C S+ L` a caustic, wherever it is measured.
+    Of whole paths: ``expression`` matches the path, some interaction of it lies in ``region``, and it falls on the film inside ``film`` (pixels:
+    left, top, right, bottom, half open). Of a walk on its way (``queries.arrivals``): the vertex that light arrives at stands for the walk's other
+    end, so that `C L` is direct light and `C S+ L` a caustic, wherever it is measured.
     """
 
     expression: Expression | None = None
@@ -25,7 +25,12 @@ class Selection:
 
     @classmethod
     def of(
-        cls, run: Run, expression: str | Expression | None = None, region: str | Region | None = None, film: FilmArea | None = None, dialect: str = "std"
+        cls,
+        run: Run,
+        expression: str | Expression | None = None,
+        region: str | Region | None = None,
+        film: FilmArea | None = None,
+        dialect: str = "std",
     ) -> "Selection":
         """A selection in the names of a run. Raises ``ExpressionError`` and ``QueryError``, with what is known."""
         if isinstance(expression, str):
@@ -39,9 +44,13 @@ class Selection:
         return cls(expression, region, film)
 
     def describe(self) -> str:
-        """The selection in words, as they follow "light": "that C S+ L selects, through the ball of …, seen in pixels …"; empty for all light."""
-        parts = [f"selected by `{self.expression}`" if self.expression else "", f"with an interaction in {self.region.describe()}" if self.region else ""]
+        """The selection in words, as they follow "light": "selected by `C S+ L`, with an interaction in the ball …"; empty for all light."""
+        parts = []
+        if self.expression:
+            parts.append(f"selected by `{self.expression}`")
+        if self.region:
+            parts.append(f"with an interaction in {self.region.describe()}")
         if self.film:
             left, top, right, bottom = self.film
             parts.append(f"on the film between ({left:g}, {top:g}) and ({right:g}, {bottom:g}) px")
-        return ", ".join(part for part in parts if part)
+        return ", ".join(parts)

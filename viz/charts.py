@@ -201,7 +201,7 @@ def convergence_chart(path: pathlib.Path, curve: ConvergenceCurve, title: str) -
     middle = len(curve.samples) // 2
     start = curve.error[middle] * (curve.samples[middle] / curve.samples[0]) ** 0.5
     ends = (curve.samples[0], curve.samples[-1])
-    axes.plot(ends, (start, start * (ends[0] / ends[1]) ** 0.5), "--", color="#8a8a8a", linewidth=1.0, zorder=2, label="slope −1/2: independent samples")
+    axes.plot(ends, (start, start * (ends[0] / ends[1]) ** 0.5), "--", color="#8a8a8a", linewidth=1.0, zorder=2, label="slope −1/2, as independent")
     fitted = "" if curve.slope is None else f", fitted slope {curve.slope:.2f}".replace("-", "−")
     axes.plot(curve.samples, curve.error, "-o", color=COLORS[0], linewidth=1.8, markersize=4, zorder=3, label=f"this run{fitted}")
     axes.legend(frameon=False, fontsize=9, labelcolor=INK)

@@ -1,11 +1,12 @@
 """What colors stand for: objects, the chrominance of light, numbers on a scale. Colors are sRGB, 0 … 1, unless they say uint8."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from queries.errors import QueryError
+from viz.tools.base import Color
 
 if TYPE_CHECKING:
     from queries.run import Run
@@ -13,7 +14,8 @@ if TYPE_CHECKING:
 F32 = npt.NDArray[np.float32]
 U8 = npt.NDArray[np.uint8]
 
-MAPS = ("viridis", "cividis", "magma", "inferno", "turbo", "gray")
+ColorMap = Literal["viridis", "cividis", "magma", "inferno", "turbo", "gray"]
+MAPS: tuple[ColorMap, ...] = get_args(ColorMap)
 """Color maps by name. All but `turbo`, the rainbow, are perceptually uniform: equal steps of the number look like equal steps."""
 
 # Hues of Okabe and Ito, which everybody tells apart, lightened where they would be lost on a dark ground. The first is kept for what shines.
@@ -60,12 +62,12 @@ def distinct_colors(count: int, lamp: int | None = None) -> F32:
 
 
 def chrominance(rgb: npt.NDArray[np.floating]) -> F32:
-    """The color of light without its brightness: linear RGB (n, 3), scaled until the largest channel is 1, as sRGB float32 (n, 3).
+    """The color of light without its brightness: linear RGB (…, 3), scaled until the largest channel is 1, as sRGB, float32.
 
     Light of no positive, finite channel has no color: white.
     """
     light = np.maximum(np.nan_to_num(np.asarray(rgb, np.float32), nan=0.0, posinf=0.0, neginf=0.0), 0)
-    largest = light.max(axis=1, keepdims=True, initial=0)
+    largest = light.max(axis=-1, keepdims=True, initial=0)
     return to_srgb(np.divide(light, largest, out=np.ones_like(light), where=largest > 0))
 
 
@@ -83,6 +85,17 @@ def mapped(name: str, values: npt.NDArray[np.floating]) -> U8:
     """The colors of values (n,) between 0 and 1, beyond which they are cut off (not a number: 0): uint8 (n, 3). Raises as ``color_map`` does."""
     steps = np.nan_to_num(np.asarray(values, np.float32), nan=0.0).clip(0, 1) * np.float32(255) + np.float32(0.5)
     return color_map(name)[steps.astype(np.uint8)]
+
+
+def as_bytes(colors: npt.NDArray[np.floating]) -> U8:
+    """Colors, cut to 0 … 1, of 8 bits a channel: uint8 of the same shape."""
+    found: U8 = np.rint(255 * np.clip(colors, 0, 1)).astype(np.uint8)
+    return found
+
+
+def as_color(rgb: npt.NDArray[np.floating]) -> Color:
+    """One color (3,) as legends have it."""
+    return float(rgb[0]), float(rgb[1]), float(rgb[2])
 
 
 def to_srgb(linear: npt.NDArray[np.floating]) -> F32:

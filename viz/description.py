@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from queries.regions.description import Part
-from viz.cameras import CameraDescription
+from viz.cameras import JOB_CAMERA, CameraDescription
 from viz.look import Look
 from viz.tools.arrows import Arrows
 from viz.tools.base import Tool
@@ -16,7 +16,6 @@ from viz.tools.particles import Particles
 from viz.tools.probe import SphericalPlot
 from viz.tools.time_of_flight import TimeOfFlight
 
-JOB_CAMERA = "job"
 Side = Annotated[int, Field(ge=64, le=8192)]
 
 

@@ -27,6 +27,8 @@ def low_pass(values: Floats, directions: Floats, weights: F64, degrees: float) -
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     angle[np.arange(bands), np.arange(bands), 0] = 0.0
     kernel = np.exp(-0.5 * (angle / degrees) ** 2)
+    # Directions are rounded: what is symmetric but for that is made so, or the integral would be kept only to their precision
+    kernel = (kernel + np.roll(kernel.transpose(1, 0, 2)[..., ::-1], 1, axis=2)) / 2
     factor = _balance(kernel.sum(axis=2), weights)
     kernel *= (factor[:, None] * factor[None, :])[..., None]
     # The convolution over sectors is a product of transforms

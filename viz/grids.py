@@ -11,8 +11,8 @@ from queries.regions.description import Part, Position
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from queries.fluence import Grid
     from queries.run import Run
+    from queries.voxels import Grid
 
 Resolution = Annotated[int, Field(ge=8, le=256)]
 
@@ -38,14 +38,26 @@ BoxField = Annotated[
 
 def grid_of(run: "Run", box: Corners | str | None, resolution: int) -> "Grid":
     """A grid of ``resolution`` voxels along its longest side, cubes if the box allows. Raises ``QueryError`` for a region that is no box."""
-    from queries.fluence import Grid
+    from queries.voxels import Grid
 
     if box is None:
         return Grid.around(run.geometry, resolution)
     low, high = (np.array(box.min), np.array(box.max)) if isinstance(box, Corners) else _bounds(run, box)
     size = high - low
-    x, y, z = np.maximum(np.rint(size / (size.max() / resolution)), 1).astype(int).tolist()
-    return Grid(_triple(low), _triple(high), (x, y, z))
+    return Grid.of(low, high, np.maximum(np.rint(size / (size.max() / resolution)), 1).astype(int))
+
+
+def beyond(walks: "Run", grid: "Grid", side: str) -> str:
+    """A sentence, after a space, about a grid that reaches a voxel or more beyond where all light is known (``Arrivals.reach``); else empty."""
+    from queries.arrivals import Arrivals
+    from queries.selection import Selection
+    from viz.numbers import number
+
+    center, radius = Arrivals(walks, Selection(), side).reach()
+    farthest = np.linalg.norm(np.maximum(np.abs(np.array(grid.low) - center), np.abs(np.array(grid.high) - center)))
+    if farthest <= radius + np.linalg.norm(grid.cell):
+        return ""
+    return f" Beyond {number(radius)} world units from the middle of the scene voxels show too little: light is traced around surfaces alone."
 
 
 def _bounds(run: "Run", name: str) -> "tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]":
@@ -64,8 +76,3 @@ def _bounds(run: "Run", name: str) -> "tuple[npt.NDArray[np.float64], npt.NDArra
         raise QueryError(f"expected a box or a ball for `box`, found region `{name}`, which is {region.describe()}: give `min` and `max`")
     center = np.array(region.center, np.float64)
     return center - half, center + half
-
-
-def _triple(values: "npt.NDArray[np.float64]") -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -2,14 +2,15 @@
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
+from queries.luminance import luminance_of
 from queries.regions.description import LARGEST, Part, Position
 
 BACKGROUNDS = {"dark": (0.07, 0.075, 0.09), "black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0)}
 _HEX = "0123456789abcdefABCDEF"
-_DARK = 0.4  # relative luminance below which a background asks for light lines
-_LUMINANCE = (0.2126, 0.7152, 0.0722)
+_DARK = 0.4  # weighted mean of sRGB channels below which a background asks for light lines
 
 
 def _color(text: str) -> str:
@@ -57,4 +58,4 @@ class Look(Part):
     @property
     def dark(self) -> bool:
         """Whether the background is so dark that lines on it must be light."""
-        return sum(weight * value for weight, value in zip(_LUMINANCE, self.background_color)) < _DARK
+        return bool(luminance_of(np.array(self.background_color)) < _DARK)

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from viz.outlines import creased, face_normals
-from viz.scene_meshes import SceneMesh
-from viz.shell import walls
+from viz.scene.meshes import SceneMesh
+from viz.scene.outlines import creased, face_normals
+from viz.scene.shell import walls
 
 if TYPE_CHECKING:
     import pyvista
@@ -65,7 +65,7 @@ class PatchSurface:
         actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
         actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(1.0, 1.0)
         if stage.look.cut is not None:
-            from viz.scene_actors import clipping_plane
+            from viz.scene.actors import clipping_plane
 
             actor.mapper.AddClippingPlane(clipping_plane(stage.look))
         elif stage.look.scene != "solid":
@@ -82,7 +82,7 @@ class PatchSurface:
         import pyvista
 
         found = pyvista.PolyData(self.patches.corners.reshape(-1, 3), self._faces(np.arange(len(self.corners))))
-        mine = {"patch": np.arange(len(self.patches)), "object": self.patches.object, "area": self.patches.area}
+        mine: dict[str, npt.NDArray[Any]] = {"patch": np.arange(len(self.patches)), "object": self.patches.object, "area": self.patches.area}
         for name, values in (mine | attributes).items():
             found.cell_data[name] = values[self.patches.patch]
         return found

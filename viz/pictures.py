@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from viz.ticks import number, ticks
+from viz.numbers import number
+from viz.ticks import ticks
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw

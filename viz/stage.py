@@ -10,7 +10,7 @@ import numpy.typing as npt
 from viz.cameras import Pose
 from viz.look import Look
 from viz.opengl import new_plotter
-from viz.scene_actors import SceneActors
+from viz.scene.actors import SceneActors
 
 if TYPE_CHECKING:
     from queries.regions.scene import SceneGeometry

@@ -1,8 +1,7 @@
-"""Ticks of a scale, and numbers as people read them."""
+"""Ticks of a scale."""
 
 import math
 
-_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _MOST_STEPS = 1000
 
@@ -24,23 +23,6 @@ def ticks(low: float, high: float, logarithmic: bool = False, most: int = 6) -> 
         length = math.log(high / low)
         return [(math.log(value / low) / length, value) for value in values]
     return [((value - low) / (high - low), value) for value in values]
-
-
-def number(value: float) -> str:
-    """A number with three digits.
-
-    >>> number(0.0123456), number(1234.5), number(2.5e-7), number(1e5)
-    ('0.0123', '1230', '2.5·10⁻⁷', '10⁵')
-    """
-    if value == 0 or not math.isfinite(value):
-        return f"{value:g}".replace("-", "−")
-    digits, _, exponent = f"{value:.2e}".partition("e")
-    power = int(exponent)
-    if -3 <= power <= 3:
-        return f"{float(f'{value:.3g}'):.10g}".replace("-", "−")
-    mantissa = f"{float(digits):g}".replace("-", "−")
-    times = "" if mantissa == "1" else "−" if mantissa == "−1" else f"{mantissa}·"
-    return times + "10" + str(power).translate(_SUPERSCRIPTS)
 
 
 def _linear(low: float, high: float, most: int) -> list[float]:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from queries.fluence import Grid
+    from queries.voxels import Grid
     from viz.stage import Stage
 
 F32 = npt.NDArray[np.float32]

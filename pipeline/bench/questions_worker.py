@@ -15,7 +15,7 @@ from pipeline.bench.worker import serve
 from pipeline.config import Rank
 from pipeline.rankings import ranked
 from queries.images import aov_image, select
-from queries.kernels.luminance import LUMINANCE
+from queries.luminance import luminance_of
 from queries.run import Run, open_run
 from queries.shards import map_shards
 from queries.word_tree import CAMERA, WordTree
@@ -44,7 +44,7 @@ def asker(path: pathlib.Path, threads: int) -> Callable[[Mapping[str, Any]], dic
             if request.get("rank"):
                 light = ranked(run, Rank.model_validate(request["rank"]), threads).num_rows
             else:
-                light = float(aov_image(run, run.compile(request["expression"]), threads).mean(axis=(0, 1)) @ np.array(LUMINANCE))
+                light = float(luminance_of(aov_image(run, run.compile(request["expression"]), threads).mean(axis=(0, 1))))
         return {"wall": watch.timing.wall, "cpu": watch.timing.cpu, "answer": light}
 
     return answer

@@ -9,8 +9,8 @@ from queries.diagnostics.answers import INTEGER, REAL, TEXT, Figure, answer, req
 from queries.diagnostics.outliers import LEAST_WALKS, Outliers, PixelSums, light_of, outlier_pixels, pixel_sums
 from queries.diagnostics.provenance import Provenance
 from queries.errors import QueryError
-from queries.kernels.luminance import LUMINANCE
 from queries.kernels.pixels import mark_above
+from queries.luminance import luminance_of
 from queries.run import Run
 from queries.shards import Array, Piece, map_shards
 from renderer.tables import TECHNIQUES
@@ -83,7 +83,7 @@ def _rows_of(run: Run, sums: PixelSums, found: Outliers, variance_share: float) 
 
 def _provenance(run: Run, sums: PixelSums, found: Outliers, rows: dict[str, Array], path_share: float) -> pa.Table:
     """The rows that matter, in the order of the outliers, with what is known of pixel, walk and path."""
-    luminance = np.stack([rows[name] for name in _LIGHT]).astype(np.float64).T @ np.array(LUMINANCE)
+    luminance = luminance_of(np.stack([rows[name] for name in _LIGHT]).T)
     kept = np.flatnonzero(luminance > path_share * rows["value"])
     kept = kept[np.lexsort((rows["path"][kept], -luminance[kept], rows["walk"][kept], -rows["value"][kept], rows["slot"][kept]))]
     rows = {name: column[kept] for name, column in rows.items()}

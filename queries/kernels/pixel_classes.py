@@ -49,7 +49,7 @@ def largest_shares(sums: F64, whole: int, classes: U8, parts: U16) -> None:
             parts[i, slot] = 0
         if not total > 0.0:
             continue
-        left, given = total, 0
+        left, given = total, np.int64(0)
         for slot in range(slots):
             best, most = -1, 0.0
             for k in range(layers - 1):

@@ -10,10 +10,10 @@ from metered import floor, gray, point_light, trace
 from queries import Run, open_run
 from queries.arrivals import Arrivals
 from queries.flow import Flow, flow
-from queries.fluence import Grid
 from queries.kernels.luminance import LUMINANCE
 from queries.selection import Selection
 from queries.shards import pieces
+from queries.voxels import Grid
 
 ALL = Selection()
 SUN = np.array([1.0, -2.0, 0.5]) / np.sqrt(5.25)

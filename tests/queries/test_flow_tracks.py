@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from queries.flow import Flow
-from queries.fluence import Grid
+from queries.voxels import Grid
 
 GRID = Grid((-1.0, -1.0, -0.5), (1.0, 1.0, 0.5), (40, 40, 20))
 

@@ -13,11 +13,12 @@ from trimesh.creation import box as box_mesh
 from queries import Run, open_run
 from queries.arrivals import Arrivals
 from queries.errors import QueryError
-from queries.fluence import Grid, deposit, fluence
+from queries.fluence import fluence
 from queries.kernels.grid import clip_lengths
 from queries.kernels.grid import deposit as deposit_kernel
 from queries.selection import Selection
 from queries.shards import Piece, map_shards
+from queries.voxels import Grid, deposit
 
 UNIT = Grid((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (4, 4, 4))
 

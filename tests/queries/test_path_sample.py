@@ -1,5 +1,6 @@
 """Samples of paths against plain Python: the paths that a selection has, and each one's vertices from the emitter to the camera."""
 
+import contextlib
 import pathlib
 from collections.abc import Iterator
 from typing import Any
@@ -177,26 +178,31 @@ def test_nothing_selected(run: Run) -> None:
 # --- one sample, however the run is cut ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("by", ["uniform", "contribution"])
-def test_threads_shards_and_the_order_of_rows_do_not_matter(placed: PlacedRun, run: Run, by: str, tmp_path: pathlib.Path) -> None:
+@pytest.fixture(scope="module")
+def forms(placed: PlacedRun, run: Run, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Run]]:
+    """The run, cut and ordered otherwise."""
+    folder = tmp_path_factory.mktemp("forms")
     vertices = [name for name in ("camera_vertices", "light_vertices") if name in run.tables]
-    forms = {
-        "one": recut(placed.folder, tmp_path / "one", cuts=[0]),
-        "seven": recut(placed.folder, tmp_path / "seven", cuts=[0, 12, 14, 100, 170, 172, 250]),
-        "batches": recut(placed.folder, tmp_path / "batches", batches={"paths": 17, vertices[0]: 31}),
-        "tiles": recut(placed.folder, tmp_path / "tiles", tile=20),
-        "shuffled": recut(placed.folder, tmp_path / "shuffled", change={"paths": shuffled(3)}),
-    }
-    with open_run(forms["tiles"]) as form:
-        assert [len(list(pieces(files, 0))) for files in form.files("paths", *vertices)] == [5, 5, 5]
+    recut(placed.folder, folder / "one", cuts=[0])
+    recut(placed.folder, folder / "seven", cuts=[0, 12, 14, 100, 170, 172, 250])
+    recut(placed.folder, folder / "batches", batches={"paths": 17, vertices[0]: 31})
+    recut(placed.folder, folder / "tiles", tile=20)
+    recut(placed.folder, folder / "shuffled", change={"paths": shuffled(3)})
+    with contextlib.ExitStack() as stack:
+        found = {form.name: stack.enter_context(open_run(form)) for form in sorted(folder.iterdir())}
+        assert [len(list(pieces(files, 0))) for files in found["tiles"].files("paths", *vertices)] == [5, 5, 5]
+        yield found
+
+
+@pytest.mark.parametrize("by", ["uniform", "contribution"])
+def test_threads_shards_and_the_order_of_rows_do_not_matter(run: Run, forms: dict[str, Run], by: str) -> None:
     for selection in (Selection(), Selection.of(run, film=(1, 1, 5, 4)), Selection.of(run, "C .* [LOB]", "ball")):
         for most in (1, 40, ALL):
             expected = sample_paths(run, selection, most, by, seed=5, threads=1)
             assert same(expected, sample_paths(run, selection, most, by, seed=5, threads=2))
             assert names(expected) == sorted(names(expected))
-            for name, folder in forms.items():
-                with open_run(folder) as form:
-                    assert same(expected, sample_paths(form, selection, most, by, seed=5)), name
+            for name, form in forms.items():
+                assert same(expected, sample_paths(form, selection, most, by, seed=5)), name
     other = sample_paths(run, Selection(), 40, by, seed=6)
     assert names(other) != names(sample_paths(run, Selection(), 40, by, seed=5))
 

@@ -46,7 +46,8 @@ def test_shares_are_those_of_brute_force(tmp_path: pathlib.Path, method: str, mo
         whole.update(classes)
     assert found.count == len(whole)
     assert [name.expression for name in found.named] == sorted(whole, key=lambda name: -whole[name])[: len(found.named)]
-    np.testing.assert_allclose([name.share for name in found.named], [whole[name.expression] / sum(whole.values()) for name in found.named], rtol=1e-6)
+    shares = [whole[name.expression] / sum(whole.values()) for name in found.named]
+    np.testing.assert_allclose([name.share for name in found.named], shares, rtol=1e-6)
     known = {name.expression for name in found.named}
     crowded = 0
     for row in range(found.classes.shape[0]):

@@ -8,6 +8,7 @@ import pytest
 from metered import BLACK, assert_scatter, ceiling_lamp, floor, gray, point_light, trace
 
 from queries import open_run
+from queries.clusters import clusters
 from queries.errors import QueryError
 from queries.kernels.luminance import LUMINANCE
 from queries.probes import Incident, Probe, incident
@@ -200,3 +201,16 @@ def test_bad_probes_are_refused(given: dict[str, Any], words: str) -> None:
 def test_bad_resolutions_are_refused(room: pathlib.Path) -> None:
     with open_run(room) as run, pytest.raises(QueryError, match="resolution of 2 to 512"):
         incident(run, ALL, Probe((0, 1, 0), 0.1), resolution=1)
+
+
+def test_probes_beyond_the_light_that_is_traced_are_refused(sky: pathlib.Path, bulb: pathlib.Path) -> None:
+    """The sky is sent into the ball around the surfaces alone: beyond it, its fluence of 4 pi would be found as nearly nothing."""
+    with open_run(sky) as run:
+        for probe in (Probe((0.0, 1.5, 0.0), 0.3), Probe((0.0, 0.9, 0.0), 0.3), Probe((0.0, 1.5, 0.0), 0.3, (0.0, 1.0, 0.0))):
+            for measure in (incident, clusters):
+                with pytest.raises(QueryError, match="where all light is known"):
+                    measure(run, ALL, probe)
+        assert incident(run, ALL, Probe((0.0, 0.6, 0.0), 0.3)).count
+    # What leaves a scene whose lights are in it is followed far beyond its surfaces, but not without end
+    with open_run(bulb) as run, pytest.raises(QueryError, match="where all light is known"):
+        incident(run, ALL, Probe((0.0, 20.0, 0.0), 0.3))

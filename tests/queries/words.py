@@ -1,5 +1,7 @@
 """Words of paths as short text, and the plainest matcher of expressions: the oracle of the tests."""
 
+import functools
+
 from queries.lpe.syntax import NAMED_FIELDS, Chain, Choice, Combination, Node, PathEvent, Repeat, Step
 
 
@@ -15,6 +17,7 @@ def word(text: str) -> tuple[PathEvent, ...]:
     return tuple(events)
 
 
+@functools.lru_cache(maxsize=4096)
 def dated(events: tuple[PathEvent, ...]) -> tuple[PathEvent, ...]:
     """The events with everything written out as facts: depths, and what labels stand for where nothing else is known."""
     found = []

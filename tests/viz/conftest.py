@@ -29,6 +29,13 @@ def spheres_run(small_folder: pathlib.Path) -> Iterator[Run]:
 
 
 @pytest.fixture(scope="session")
+def spheres_light(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """The folder of a run of the same room, traced from its lamp."""
+    settings = ("method=light", "resolution=[64, 48]", "samples=16", "seed=3", "sampler=independent", "max_depth=5")
+    return small_run("spheres", tmp_path_factory.mktemp("light"), *(f"render.{setting}" for setting in settings))
+
+
+@pytest.fixture(scope="session")
 def furnace(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     """The folder of a run of a closed room in which light is the same everywhere."""
     return make_furnace(tmp_path_factory.mktemp("furnace"))

@@ -29,8 +29,13 @@ SIDES = 32
 def draw(folder: pathlib.Path, *probes: dict[str, object], **given: object) -> tuple[Drawn, np.ndarray]:
     """What the tool says, and the picture."""
     with open_run(folder) as run, Stage(run, size=(160, 120)) as stage:
-        drawn = Arrows.model_validate({"probes": list(probes), **given}).draw(run, stage)
-        return drawn, np.empty(0) if drawn.empty else stage.picture(job_pose(run))
+        return Arrows.model_validate({"probes": list(probes), **given}).draw(run, stage), stage.picture(job_pose(run))
+
+
+def told(folder: pathlib.Path, *probes: dict[str, object], **given: object) -> Drawn:
+    """What the tool says."""
+    with open_run(folder) as run, Stage(run, size=(160, 120)) as stage:
+        return Arrows.model_validate({"probes": list(probes), **given}).draw(run, stage)
 
 
 def found_at(folder: pathlib.Path, **given: object) -> Clusters:
@@ -54,7 +59,7 @@ def tips_and_tails(drawn: Drawn, key: str = "arrows_1") -> list[tuple[np.ndarray
 
 
 def test_cross_sections_are_proportional_to_flux(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, width=0.05, threshold=0.0)
+    drawn = told(furnace, SPACE, width=0.05, threshold=0.0)
     mesh, found = drawn.meshes["arrows_1"], found_at(furnace, threshold=0.0)
     first = np.unique(mesh.point_data["arrow"], return_index=True)[1]
     flux = mesh.point_data["luminance"][first]
@@ -71,7 +76,7 @@ def test_cross_sections_are_proportional_to_flux(furnace: pathlib.Path) -> None:
 
 def test_shares_are_those_of_the_closed_room(furnace: pathlib.Path) -> None:
     """The share 1 - Kd of each channel comes straight from emitters; reflected light has the rest, and its color."""
-    drawn, _ = draw(furnace, SPACE, threshold=0.0, groups={})
+    drawn = told(furnace, SPACE, threshold=0.0, groups={})
     found = found_at(furnace, threshold=0.0)
     emitted = [a for a in found.arrows if a.event == "emitter"]
     total = sum(a.value for a in emitted) @ LUMINANCE
@@ -85,7 +90,7 @@ def test_shares_are_those_of_the_closed_room(furnace: pathlib.Path) -> None:
 
 
 def test_arrows_lead_from_surfaces_to_the_probe(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, FLOOR)
+    drawn = told(furnace, SPACE, FLOOR)
     found = found_at(furnace)
     with open_run(furnace) as run:
         bounds = run.geometry.caster.bounds
@@ -99,7 +104,7 @@ def test_arrows_lead_from_surfaces_to_the_probe(furnace: pathlib.Path) -> None:
 
 
 def test_arrows_of_a_history_form_a_tree(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, history=2, threshold=0.02)
+    drawn = told(furnace, SPACE, history=2, threshold=0.02)
     found, measured = found_at(furnace, history=2, threshold=0.02), tips_and_tails(drawn)
     deeper = [i for i, a in enumerate(found.arrows) if a.level == 2]
     assert len(deeper) >= 2
@@ -117,11 +122,11 @@ def test_arrows_of_a_history_form_a_tree(furnace: pathlib.Path) -> None:
 
 
 def test_groups_and_thresholds(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, groups={"room": ["walls", "block"]})
+    drawn = told(furnace, SPACE, groups={"room": ["walls", "block"]})
     assert [line for line, _ in drawn.legend] == ["room 100 %"] or drawn.legend[0][0].startswith("room 100")
     assert len(tips_and_tails(drawn)) == 1
-    many, _ = draw(furnace, SPACE, threshold=0.0)
-    few, _ = draw(furnace, SPACE, threshold=0.3)
+    many = told(furnace, SPACE, threshold=0.0)
+    few = told(furnace, SPACE, threshold=0.3)
     assert few.figures["probe_1_arrows"] < many.figures["probe_1_arrows"]
     assert few.figures["probe_1_left_out"] > 0
     assert "arrows below 30 % are left out" in few.caption
@@ -130,7 +135,7 @@ def test_groups_and_thresholds(furnace: pathlib.Path) -> None:
 
 def test_colors(furnace: pathlib.Path) -> None:
     """By cluster, those of objects, set aside where one has several; by chrominance, those of the light."""
-    drawn, _ = draw(furnace, SPACE, threshold=0.0)
+    drawn = told(furnace, SPACE, threshold=0.0)
     found = found_at(furnace, threshold=0.0)
     with open_run(furnace) as run:
         of_objects = object_colors(run)
@@ -140,7 +145,7 @@ def test_colors(furnace: pathlib.Path) -> None:
     mesh = drawn.meshes["arrows_1"]
     first = np.unique(mesh.point_data["arrow"], return_index=True)[1]
     np.testing.assert_array_equal(mesh.point_data["color"][first], np.rint(255 * np.array([color for _, color in drawn.legend])))
-    light, _ = draw(furnace, SPACE, threshold=0.0, color="chrominance")
+    light = told(furnace, SPACE, threshold=0.0, color="chrominance")
     np.testing.assert_allclose([color for _, color in light.legend], chrominance(np.array([a.value for a in found.arrows])), atol=1e-6)
 
 
@@ -178,7 +183,7 @@ def test_an_arrow_without_length_is_nothing() -> None:
 
 
 def test_no_light_is_said(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, FLOOR, expression="C S L")
+    drawn = told(furnace, SPACE, FLOOR, expression="C S L")
     assert drawn.empty
     assert "No light" in drawn.caption
     assert "2 probes" in drawn.caption

@@ -76,12 +76,19 @@ def test_a_selection_without_light_says_so(run: Run) -> None:
 
 
 def test_more_paths_than_fit_are_sampled_and_the_caption_says_so(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bundles, "MEMORY", 24 * bundles.BYTES_PER_POINT * 500)  # room for 500 segments
+    monkeypatch.setattr(bundles, "MEMORY", (24 * bundles.BYTES_PER_POINT + bundles.BYTES_PER_SEGMENT) * 500)  # room for 500 segments
     found, _ = drawn(run, most=1_000_000, choose="uniform", to_camera=True)
     assert 250 < found.figures["segments_drawn"] <= 500
     drawn_paths, of = found.figures["paths_drawn"], found.figures["paths_found"]
     assert found.caption.startswith(f"{drawn_paths:,} of the 1,000,000 light paths asked for, of {of:,}")
     assert "would not fit" in found.caption
+
+
+def test_curves_of_few_points_are_counted_with_what_their_segments_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As measured, in bytes above an empty stage: 614 for a segment of 3 points, 2,080 for one of 24."""
+    monkeypatch.setattr(bundles, "MEMORY", 1.5e9)
+    for points, measured in ((3, 614), (24, 2080)):
+        assert 0.9 * 1.5e9 < Bundles(points=points)._room() * measured <= 1.5e9
 
 
 def test_straight_segments_are_called_true_paths_and_are(run: Run) -> None:

@@ -4,13 +4,11 @@ import pathlib
 
 import numpy as np
 import pytest
-import yaml
 from pydantic import ValidationError
 
-from pipeline.stages import run_job
 from queries import open_run
 from queries.errors import QueryError
-from queries.fluence import Grid
+from queries.voxels import Grid
 from viz.cameras import CameraDescription, Orbit, job_pose, poses
 from viz.grids import Corners, grid_of
 from viz.look import Look
@@ -19,7 +17,6 @@ from viz.tools.base import Drawn
 from viz.tools.fluence import FluenceVolume
 from viz.volume import add_volume
 
-SCENE = pathlib.Path(__file__).parents[2] / "configs" / "scenes" / "spheres.yaml"
 BARE = Look(scene="hidden", background="black")
 REGIONS = {
     "ball": {"sphere": {"center": [0.1, 0.2, 0.3], "radius": 0.5}},
@@ -28,26 +25,18 @@ REGIONS = {
 }
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    place = tmp_path_factory.mktemp("volume")
-    render = {"method": "light", "resolution": [64, 48], "samples": 8, "seed": 3, "sampler": "independent", "max_depth": 5}
-    (place / "job.yaml").write_text(yaml.safe_dump({"name": "spheres", "scene": str(SCENE), "render": render}))
-    return run_job(place / "job.yaml", out=place / "run", threads=1).path
-
-
 def picture(folder: pathlib.Path, tool: FluenceVolume, look: Look = BARE) -> tuple[Drawn, np.ndarray]:
     with open_run(folder, regions=REGIONS) as run, Stage(run, look, (120, 90)) as stage:
         drawn = tool.draw(run, stage)
         return drawn, stage.picture(job_pose(run))
 
 
-def test_the_same_run_gives_the_same_picture(folder: pathlib.Path) -> None:
+def test_the_same_run_gives_the_same_picture(spheres_light: pathlib.Path) -> None:
     tool = FluenceVolume(resolution=16)
-    drawn, first = picture(folder, tool, Look())
-    _, second = picture(folder, tool, Look())
+    drawn, first = picture(spheres_light, tool, Look())
+    _, second = picture(spheres_light, tool, Look())
     np.testing.assert_array_equal(first, second)
-    _, bare = picture(folder, FluenceVolume(resolution=16, expression="C D L", box=Corners(min=(5, 5, 5), max=(6, 6, 6))), Look())
+    _, bare = picture(spheres_light, FluenceVolume(resolution=16, expression="C D L", box=Corners(min=(5, 5, 5), max=(6, 6, 6))), Look())
     assert np.abs(first.astype(int) - bare).mean() > 2
     assert drawn.color_bar is not None
     assert drawn.color_bar.logarithmic
@@ -55,16 +44,16 @@ def test_the_same_run_gives_the_same_picture(folder: pathlib.Path) -> None:
     assert f"{drawn.figures['segments']:,} segments" in drawn.caption
 
 
-def test_figures_do_not_depend_on_the_grid(folder: pathlib.Path) -> None:
+def test_figures_do_not_depend_on_the_grid(spheres_light: pathlib.Path) -> None:
     box = Corners(min=(-1.0, 0.1, -1.0), max=(1.0, 1.9, 1.0))
-    totals = [picture(folder, FluenceVolume(resolution=n, box=box, scale="linear"))[0].figures["total_flux_times_length"] for n in (8, 24)]
+    totals = [picture(spheres_light, FluenceVolume(resolution=n, box=box, scale="linear"))[0].figures["total_flux_times_length"] for n in (8, 24)]
     assert totals[0] == pytest.approx(totals[1], rel=1e-6)
     # Light straight from the lamp and the rest are all of it
-    parts = [picture(folder, FluenceVolume(resolution=8, box=box, expression=text))[0].figures for text in ("C L", "C .+ L")]
+    parts = [picture(spheres_light, FluenceVolume(resolution=8, box=box, expression=text))[0].figures for text in ("C L", "C .+ L")]
     assert sum(float(part["total_flux_times_length"]) for part in parts) == pytest.approx(float(totals[0]), rel=1e-6)
 
 
-def test_a_volume_is_where_its_grid_is(folder: pathlib.Path) -> None:
+def test_a_volume_is_where_its_grid_is(spheres_light: pathlib.Path) -> None:
     """One bright voxel of a coarse grid covers the pixels that its center is seen in, in its own color, and no others far from it."""
     grid = Grid((-1.0, 0.0, -1.0), (1.0, 2.0, 1.0), (8, 8, 8))
     strength = np.zeros(grid.shape, np.float32)
@@ -72,7 +61,7 @@ def test_a_volume_is_where_its_grid_is(folder: pathlib.Path) -> None:
     colors = np.zeros((*grid.shape, 3), np.uint8)
     colors[...] = 200, 100, 50
     center = np.array([grid.centers(axis)[at] for axis, at in enumerate((6, 1, 3))])
-    with open_run(folder) as run, Stage(run, BARE, (160, 120)) as stage:
+    with open_run(spheres_light) as run, Stage(run, BARE, (160, 120)) as stage:
         add_volume(stage, grid, colors, strength, 0.9)
         for orbit in (Orbit(azimuth=0, elevation=0), Orbit(azimuth=100, elevation=40)):
             (pose,) = poses(run, CameraDescription(orbit=orbit), {}, run.geometry)
@@ -86,13 +75,13 @@ def test_a_volume_is_where_its_grid_is(folder: pathlib.Path) -> None:
             np.testing.assert_allclose(brightest / brightest[0], [1, 0.5, 0.25], atol=0.06)
 
 
-def test_rays_through_empty_voxels_lose_no_light(folder: pathlib.Path) -> None:
+def test_rays_through_empty_voxels_lose_no_light(spheres_light: pathlib.Path) -> None:
     """Fog around an empty ball: the fewer voxels with fog a ray passes through, the darker, and smoothly so."""
     grid = Grid((-1.2, 0.0, -1.2), (1.2, 2.4, 1.2), (48, 48, 48))
     place = np.stack(np.meshgrid(*(grid.centers(axis) for axis in range(3)), indexing="ij"), axis=3)
     distance = np.linalg.norm(place - [0.0, 1.0, 0.0], axis=3)
     white = np.full((*grid.shape, 3), 255, np.uint8)
-    with open_run(folder) as run:
+    with open_run(spheres_light) as run:
         (pose,) = poses(run, CameraDescription(orbit=Orbit(azimuth=0, elevation=0)), {}, run.geometry)
         images = []
         for hole in (0.0, 0.03):  # of strength: nothing, and hardly more
@@ -101,23 +90,23 @@ def test_rays_through_empty_voxels_lose_no_light(folder: pathlib.Path) -> None:
                 images.append(stage.picture(pose).astype(int))
     difference = images[1] - images[0]
     assert difference.min() >= -1
-    assert difference.max() <= 12
+    assert difference.max() <= 255 * (1 - (1 - 0.03 * 0.7) ** (1.2 / 0.24))  # what fog of strength 0.03 hides along the ball's diameter
 
 
-def test_scales(folder: pathlib.Path) -> None:
-    linear = picture(folder, FluenceVolume(resolution=12, scale="linear"))[0].color_bar
-    given = picture(folder, FluenceVolume(resolution=12, range=(0.5, 8.0), map="viridis"))[0].color_bar
+def test_scales(spheres_light: pathlib.Path) -> None:
+    linear = picture(spheres_light, FluenceVolume(resolution=12, scale="linear"))[0].color_bar
+    given = picture(spheres_light, FluenceVolume(resolution=12, range=(0.5, 8.0), map="viridis"))[0].color_bar
     assert linear is not None
     assert given is not None
     assert linear.low == 0 < linear.high
     assert (given.low, given.high) == (0.5, 8.0)
-    chromatic, image = picture(folder, FluenceVolume(resolution=12, color="chrominance"))
+    chromatic, image = picture(spheres_light, FluenceVolume(resolution=12, color="chrominance"))
     assert chromatic.color_bar is None
     assert image.max() > 20
 
 
-def test_boxes(folder: pathlib.Path) -> None:
-    with open_run(folder, regions=REGIONS) as run:
+def test_boxes(spheres_light: pathlib.Path) -> None:
+    with open_run(spheres_light, regions=REGIONS) as run:
         ball = grid_of(run, "ball", 10)
         np.testing.assert_allclose([ball.low, ball.high], [[-0.4, -0.3, -0.2], [0.6, 0.7, 0.8]])
         assert ball.shape == (10, 10, 10)
@@ -130,8 +119,8 @@ def test_boxes(folder: pathlib.Path) -> None:
             grid_of(run, "nowhere", 8)
 
 
-def test_nothing_selected(folder: pathlib.Path) -> None:
-    drawn, _ = picture(folder, FluenceVolume(resolution=8, expression="C <TD> L"))
+def test_nothing_selected(spheres_light: pathlib.Path) -> None:
+    drawn, _ = picture(spheres_light, FluenceVolume(resolution=8, expression="C <TD> L"))
     assert drawn.empty
     assert "no such light" in drawn.caption
 

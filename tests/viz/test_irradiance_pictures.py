@@ -30,14 +30,20 @@ def draw(folder: pathlib.Path, look: Look | None = None, camera: CameraDescripti
     """What the tool says, and the picture."""
     with open_run(folder) as run, Stage(run, look, SIZE) as stage:
         drawn = Irradiance(**given).draw(run, stage)
-        return drawn, np.empty(0) if drawn.empty else stage.picture(poses(run, camera, {})[0]) if drawn.image is None else drawn.image
+        return drawn, stage.picture(poses(run, camera, {})[0]) if drawn.image is None else drawn.image
+
+
+def told(folder: pathlib.Path, look: Look | None = None, **given: object) -> Drawn:
+    """What the tool says."""
+    with open_run(folder) as run, Stage(run, look, SIZE) as stage:
+        return Irradiance(**given).draw(run, stage)
 
 
 # --- on the meshes ------------------------------------------------------------------------------------------------
 
 
 def test_the_mesh_holds_what_was_estimated(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, patch=0.6)
+    drawn = told(furnace, patch=0.6)
     mesh = drawn.meshes["irradiance"]
     with open_run(furnace) as run:
         cut = patches(run.geometry, 0.6)
@@ -53,7 +59,7 @@ def test_the_mesh_holds_what_was_estimated(furnace: pathlib.Path) -> None:
 
 
 def test_irradiance_is_what_the_closed_room_has(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, patch=0.6)
+    drawn = told(furnace, patch=0.6)
     mesh, figures = drawn.meshes["irradiance"], drawn.figures
     assert figures["area"] == pytest.approx(AREA, rel=1e-6)
     assert abs(figures["total_flux"] - EXPECTED @ LUMINANCE * AREA) < 4 * figures["total_standard_error"]
@@ -65,7 +71,7 @@ def test_irradiance_is_what_the_closed_room_has(furnace: pathlib.Path) -> None:
 
 
 def test_direct_light_alone(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, patch=1.0, expression="C L")
+    drawn = told(furnace, patch=1.0, expression="C L")
     assert abs(drawn.figures["total_flux"] - np.pi * LE @ LUMINANCE * AREA) < 4 * drawn.figures["total_standard_error"]
     assert "`CL`" in drawn.caption
 
@@ -92,7 +98,7 @@ def test_pixels_show_the_patch_behind_them(furnace: pathlib.Path) -> None:
 
 
 def test_range_is_kept(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, range=(0.5, 6.25), scale="log", map="rainbow")
+    drawn = told(furnace, range=(0.5, 6.25), scale="log", map="rainbow")
     bar, mesh = drawn.color_bar, drawn.meshes["irradiance"]
     assert bar is not None
     assert (bar.low, bar.high, bar.logarithmic) == (0.5, 6.25, True)
@@ -107,7 +113,7 @@ def test_range_is_kept(furnace: pathlib.Path) -> None:
 
 
 def test_hidden_objects_are_left_out(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, Look(hide=["block"]), patch=1.0)
+    drawn = told(furnace, Look(hide=["block"]), patch=1.0)
     assert set(drawn.meshes["irradiance"].cell_data["object"]) == {0}
     assert drawn.figures["area"] == pytest.approx(6 * SIDE**2)
 
@@ -185,7 +191,7 @@ def test_image_space(furnace: pathlib.Path) -> None:
 
 @pytest.mark.parametrize("space", ["surface", "image"])
 def test_no_light_is_said(furnace: pathlib.Path, space: str) -> None:
-    drawn, _ = draw(furnace, space=space, expression="C S L")
+    drawn = told(furnace, space=space, expression="C S L")
     assert drawn.empty
     assert "No light" in drawn.caption
     assert "`CSL`" in drawn.caption

@@ -7,8 +7,9 @@ import pytest
 from PIL import Image
 
 from viz.colors import color_map
+from viz.numbers import number
 from viz.pictures import finished, message_picture, write_animation, write_png
-from viz.ticks import number, ticks
+from viz.ticks import ticks
 from viz.tools.base import ColorBar, Drawn
 
 CAPTION = "Caustics on the floor, as bundled light paths: 2,000 of 314,159 paths of `C D S+ L`. Bundled curves are not physical paths."

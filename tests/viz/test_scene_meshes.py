@@ -9,9 +9,9 @@ import trimesh
 
 from queries.errors import QueryError
 from queries.run import Run
-from viz.outlines import creased, face_normals, outlines
-from viz.scene_meshes import SceneMesh, merged, scene_meshes
-from viz.shell import walls
+from viz.scene.meshes import SceneMesh, merged, scene_meshes
+from viz.scene.outlines import creased, face_normals, outlines
+from viz.scene.shell import walls
 
 
 def area(mesh: SceneMesh) -> float:

@@ -26,8 +26,13 @@ FLOOR = {"position": [-0.5, -1.5, 0.3], "radius": 0.4, "normal": [0, 1, 0]}
 def draw(folder: pathlib.Path, *probes: dict[str, object], **given: object) -> tuple[Drawn, np.ndarray]:
     """What the tool says, and the picture."""
     with open_run(folder) as run, Stage(run, size=(160, 120)) as stage:
-        drawn = SphericalPlot.model_validate({"probes": list(probes), **given}).draw(run, stage)
-        return drawn, np.empty(0) if drawn.empty else stage.picture(job_pose(run))
+        return SphericalPlot.model_validate({"probes": list(probes), **given}).draw(run, stage), stage.picture(job_pose(run))
+
+
+def told(folder: pathlib.Path, *probes: dict[str, object], **given: object) -> Drawn:
+    """What the tool says."""
+    with open_run(folder) as run, Stage(run, size=(160, 120)) as stage:
+        return SphericalPlot.model_validate({"probes": list(probes), **given}).draw(run, stage)
 
 
 def grid(probe: Probe, bands: int = 16, sectors: int = 32) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -46,7 +51,7 @@ def grid(probe: Probe, bands: int = 16, sectors: int = 32) -> tuple[np.ndarray, 
 def test_the_plot_s_integral_is_what_the_probe_measures(
     furnace: pathlib.Path, probe: dict[str, object], name: str, share: float, smooth: float
 ) -> None:
-    drawn, _ = draw(furnace, probe, smooth=smooth, resolution=24)
+    drawn = told(furnace, probe, smooth=smooth, resolution=24)
     points = drawn.meshes["probe_1"].point_data
     total = (points["radiance"].astype(np.float64) * points["solid_angle"][:, None]).sum(axis=0)
     with open_run(furnace) as run:
@@ -59,7 +64,7 @@ def test_the_plot_s_integral_is_what_the_probe_measures(
 
 
 def test_distances_are_radiance(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, size=0.7, resolution=16)
+    drawn = told(furnace, SPACE, size=0.7, resolution=16)
     mesh = drawn.meshes["probe_1"]
     distance = np.linalg.norm(np.asarray(mesh.points, np.float64) - SPACE["position"], axis=1)
     cells = mesh.point_data["solid_angle"] > 0
@@ -68,7 +73,7 @@ def test_distances_are_radiance(furnace: pathlib.Path) -> None:
     luminance = mesh.point_data["luminance"].astype(np.float64)
     np.testing.assert_allclose(distance[cells], 0.7 * (luminance / luminance.max())[cells], rtol=1e-4)
     assert drawn.figures["probe_1_largest_radiance"] == pytest.approx(luminance.max(), rel=1e-6)
-    squeezed, _ = draw(furnace, SPACE, size=0.7, resolution=16, power=0.5)
+    squeezed = told(furnace, SPACE, size=0.7, resolution=16, power=0.5)
     other = np.linalg.norm(np.asarray(squeezed.meshes["probe_1"].points, np.float64) - SPACE["position"], axis=1)
     np.testing.assert_allclose(other[cells], 0.7 * np.sqrt(luminance / luminance.max())[cells], rtol=1e-4)
     assert "to the power 0.5" in squeezed.caption
@@ -78,7 +83,7 @@ def test_distances_are_radiance(furnace: pathlib.Path) -> None:
 def test_points_lie_where_light_comes_from(furnace: pathlib.Path) -> None:
     """Light straight from the block comes from within the cone around it, and colors are those of its emission."""
     position = np.array([-0.9, -0.5, 0.2])
-    drawn, _ = draw(furnace, {"position": position.tolist(), "radius": 0.05}, expression="C L@object:block", resolution=32, smooth=0)
+    drawn = told(furnace, {"position": position.tolist(), "radius": 0.05}, expression="C L@object:block", resolution=32, smooth=0)
     points = drawn.meshes["probe_1"].point_data
     lit = points["solid_angle"] * points["luminance"] > 0
     assert lit.sum() >= 3
@@ -93,7 +98,7 @@ def test_points_lie_where_light_comes_from(furnace: pathlib.Path) -> None:
 
 @pytest.mark.parametrize("scale", ["together", "each"])
 def test_scale_of_several_probes(furnace: pathlib.Path, scale: str) -> None:
-    drawn, _ = draw(furnace, SPACE, FLOOR, scale=scale, size=0.5, resolution=16)
+    drawn = told(furnace, SPACE, FLOOR, scale=scale, size=0.5, resolution=16)
     peaks = [drawn.figures[f"probe_{i}_largest_radiance"] for i in (1, 2)]
     for i, (probe, peak) in enumerate(zip((SPACE, FLOOR), peaks), start=1):
         mesh = drawn.meshes[f"probe_{i}"]
@@ -168,7 +173,7 @@ def test_a_constant_is_a_sphere_or_half_of_one(normal: tuple[float, float, float
 
 
 def test_no_light_is_said(furnace: pathlib.Path) -> None:
-    drawn, _ = draw(furnace, SPACE, expression="C S L")
+    drawn = told(furnace, SPACE, expression="C S L")
     assert drawn.empty
     assert "No light" in drawn.caption
     assert "the sphere of radius 0.4 around (-0.6, 0.3, -0.2)" in drawn.caption
@@ -176,7 +181,7 @@ def test_no_light_is_said(furnace: pathlib.Path) -> None:
 
 def test_a_probe_in_the_dark_has_its_ring(furnace: pathlib.Path) -> None:
     """Inside the block nothing arrives: the other probe is drawn, and the picture goes on."""
-    drawn, _ = draw(furnace, {"position": list(BLOCK), "radius": 0.05}, SPACE)
+    drawn = told(furnace, {"position": list(BLOCK), "radius": 0.05}, SPACE)
     assert set(drawn.meshes) == {"marker_1", "marker_2", "probe_2"}
     assert drawn.figures["probe_1_segments"] == 0
     assert not drawn.empty

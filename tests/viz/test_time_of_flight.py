@@ -1,16 +1,15 @@
 """Time of flight: what frames show is exactly what light passes in their time; waves from infinity are in phase; pictures say what they are."""
 
 import itertools
-import pathlib
 
 import numpy as np
 import pytest
-import yaml
 from pydantic import ValidationError
 
-from pipeline.stages import run_job
-from queries import open_run
-from queries.path_sample import PathSample
+from queries import Run
+from queries.luminance import luminance_of
+from queries.path_sample import PathSample, sample_paths
+from queries.selection import Selection
 from renderer.tables import EMITTER, LENS, NO_OBJECT
 from viz.cameras import job_pose
 from viz.flight import bent, flight, windows
@@ -20,7 +19,6 @@ from viz.tools.base import Drawn
 from viz.tools.time_of_flight import TimeOfFlight
 
 CENTER, RADIUS = np.array([0.5, 0.0, 0.0]), 3.0
-SCENE = pathlib.Path(__file__).parents[2] / "configs" / "scenes" / "spheres.yaml"
 
 
 def sample_of(polylines: list[np.ndarray], infinite: bool = False) -> PathSample:
@@ -140,16 +138,8 @@ def test_bent_segments_keep_their_ends_and_times(sample: PathSample) -> None:
 # --- the tool -----------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    place = tmp_path_factory.mktemp("flight")
-    render = {"method": "path", "resolution": [24, 18], "samples": 4, "seed": 3, "sampler": "independent", "max_depth": 6}
-    (place / "job.yaml").write_text(yaml.safe_dump({"name": "spheres", "scene": str(SCENE), "render": render}))
-    return run_job(place / "job.yaml", out=place / "run", threads=1).path
-
-
-def drawn_with(folder: pathlib.Path, tool: TimeOfFlight, pick: int | None = None) -> tuple[Drawn, list[np.ndarray]]:
-    with open_run(folder) as run, Stage(run, Look(), (120, 90)) as stage:
+def drawn_with(run: Run, tool: TimeOfFlight, pick: int | None = None) -> tuple[Drawn, list[np.ndarray]]:
+    with Stage(run, Look(), (120, 90)) as stage:
         drawn = tool.draw(run, stage)
         pictures = []
         for i in [pick] if pick is not None else range(len(drawn.frames) or 1):
@@ -159,30 +149,42 @@ def drawn_with(folder: pathlib.Path, tool: TimeOfFlight, pick: int | None = None
     return drawn, pictures
 
 
-def test_frames(folder: pathlib.Path) -> None:
+def test_frames(spheres_run: Run) -> None:
     tool = TimeOfFlight(most=300, frames=4, seed=1)
-    drawn, pictures = drawn_with(folder, tool)
+    drawn, pictures = drawn_with(spheres_run, tool)
     assert len(drawn.frames) == len(drawn.frame_notes) == 4
     assert len({picture.tobytes() for picture in pictures}) == 4
     assert drawn.figures["paths_drawn"] == 300
     # The same pixels again, whatever was shown before
-    np.testing.assert_array_equal(pictures[2], drawn_with(folder, tool, 2)[1][0])
+    np.testing.assert_array_equal(pictures[2], drawn_with(spheres_run, tool, 2)[1][0])
     mesh = drawn.meshes["paths"]
     lengths = np.linalg.norm(np.diff(mesh.points.reshape(-1, 2, 3).astype(np.float64), axis=1)[:, 0], axis=1)
     assert lengths.sum() == pytest.approx(drawn.figures["drawn_length_world_units"], rel=1e-5)
     np.testing.assert_allclose(np.diff(mesh.point_data["travelled"].reshape(-1, 2), axis=1)[:, 0], lengths, atol=1e-5)
 
 
-def test_late_frames_are_empty_and_still_pictures(folder: pathlib.Path) -> None:
-    _, (late,) = drawn_with(folder, TimeOfFlight(most=50, frames=3, times=(1000.0, 1001.0)), 1)
-    _, (bare,) = drawn_with(folder, TimeOfFlight(most=50, frames=1, times=(1000.0, 1001.0)))
+@pytest.mark.parametrize("choose", ["uniform", "contribution"])
+def test_half_of_the_light_has_arrived_at_the_median(spheres_run: Run, choose: str) -> None:
+    tool = TimeOfFlight.model_validate({"most": 100_000, "choose": choose, "frames": 1})
+    drawn, _ = drawn_with(spheres_run, tool)
+    sample = sample_paths(spheres_run, Selection(), 100_000)
+    light = luminance_of(sample.contribution)
+    lengths = [np.linalg.norm(np.diff(sample.points[a:b], axis=0), axis=1).sum() for a, b in itertools.pairwise(sample.start)]
+    median = float(drawn.figures["median_arrival_world_units"])
+    early = light[np.array(lengths) <= median * (1 + 1e-6)].sum() / light.sum()
+    assert early == pytest.approx(0.5, abs=light.max() / light.sum() + 1e-3)
+
+
+def test_late_frames_are_empty_and_still_pictures(spheres_run: Run) -> None:
+    _, (late,) = drawn_with(spheres_run, TimeOfFlight(most=50, frames=3, times=(1000.0, 1001.0)), 1)
+    _, (bare,) = drawn_with(spheres_run, TimeOfFlight(most=50, frames=1, times=(1000.0, 1001.0)))
     np.testing.assert_array_equal(late, bare)
 
 
 @pytest.mark.parametrize("color", ["bounce", "chrominance", "object"])
-def test_colors(folder: pathlib.Path, color: str) -> None:
+def test_colors(spheres_run: Run, color: str) -> None:
     settings = {"most": 200, "frames": 1, "color": color, "times": (0.5, 2.5), "window": 2.0, "fade": False, "expression": "C D L"}
-    drawn, (picture,) = drawn_with(folder, TimeOfFlight.model_validate(settings))
+    drawn, (picture,) = drawn_with(spheres_run, TimeOfFlight.model_validate(settings))
     assert picture.std() > 0
     assert "CDL" in drawn.caption
     names = [name for name, _ in drawn.legend]
@@ -192,9 +194,9 @@ def test_colors(folder: pathlib.Path, color: str) -> None:
         assert "from glass" not in names
 
 
-def test_a_selection_without_paths(folder: pathlib.Path) -> None:
-    with open_run(folder) as run, Stage(run, Look(), (60, 40)) as stage:
-        drawn = TimeOfFlight(expression="C <TD> L").draw(run, stage)
+def test_a_selection_without_paths(spheres_run: Run) -> None:
+    with Stage(spheres_run, Look(), (60, 40)) as stage:
+        drawn = TimeOfFlight(expression="C <TD> L").draw(spheres_run, stage)
     assert drawn.empty
     assert "no light path" in drawn.caption
 

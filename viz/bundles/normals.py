@@ -7,6 +7,7 @@ the light that arrives (at emitters: toward the light that leaves).
 import numpy as np
 import numpy.typing as npt
 
+from queries.kernels.regions import CYLINDER, SPHERE
 from queries.path_sample import PathSample
 from queries.regions.rays import RayCaster
 from renderer.tables import NO_OBJECT
@@ -16,7 +17,6 @@ I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
 UNKNOWN = 0  # 1 to 6: +x, -x, +y, -y, +z, -z
 _SHARE = 1e-3  # of the segment, before and behind the vertex, in which its surface is looked for
-_CYLINDER, _SPHERE = 2, 0  # kinds of quadrics
 
 
 def facing(sample: PathSample, caster: RayCaster) -> U8:
@@ -53,8 +53,8 @@ def geometric_normals(caster: RayCaster, primitive: I32, points: F64) -> F64:
     quadric = primitive[curved] - len(caster.corners)
     to_object, kind = caster.to_object[quadric], caster.kinds[quadric]
     local = np.einsum("kij,kj->ki", to_object[:, :, :3], points[curved]) + to_object[:, :, 3]
-    local[kind == _CYLINDER, 2] = 0
-    local[(kind != _CYLINDER) & (kind != _SPHERE)] = (0, 0, 1)
+    local[kind == CYLINDER, 2] = 0
+    local[(kind != CYLINDER) & (kind != SPHERE)] = (0, 0, 1)
     # Normals go over to the world by the inverse transpose
     normals[curved] = np.einsum("kij,ki->kj", to_object[:, :, :3], local)
     return normals

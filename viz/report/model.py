@@ -31,13 +31,16 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class Shape:
-    """Surfaces or lines of one look. ``colors``: the name of a uint8 RGB array of the mesh's points or cells, which then replaces ``color``."""
+    """Surfaces or lines of one look. ``colors``: the name of a uint8 RGB array of the mesh's points or cells, which then replaces ``color``.
+
+    ``shines``: it is as bright from wherever it is seen; lines always are.
+    """
 
     mesh: "pyvista.PolyData"
     color: Color = (0.8, 0.8, 0.8)
     colors: str | None = None
     opacity: float = 1.0
-    line_width: float = 1.0
+    shines: bool = False
 
 
 @dataclass(frozen=True)
@@ -130,7 +133,7 @@ def _actor(number: int, shape: Shape, arrays: dict[str, Any]) -> dict[str, Any]:
     """One shape with its mapper and its look; lines are not shaded."""
     name = f"actor{number}"
     mesh = shape.mesh.triangulate() if len(shape.mesh.faces) and not shape.mesh.is_all_triangles else shape.mesh
-    surface = bool(len(mesh.faces))
+    shaded = bool(len(mesh.faces)) and not shape.shines
     data: dict[str, Any] = {"points": _array(np.asarray(mesh.points, np.float32), "vtkPoints", "points", arrays)}
     for kind, cells in (("lines", mesh.lines), ("polys", mesh.faces)):
         if len(cells):
@@ -138,8 +141,8 @@ def _actor(number: int, shape: Shape, arrays: dict[str, Any]) -> dict[str, Any]:
     data["fields"] = [] if shape.colors is None else [_colors(mesh, shape.colors, arrays)]
     colored = shape.colors is not None
     scalars = {"scalarVisibility": colored, "colorMode": 2 if colored else 0, "scalarMode": 0, "interpolateScalarsBeforeMapping": False}
-    look: dict[str, Any] = {"color": list(shape.color), "diffuseColor": list(shape.color), "opacity": shape.opacity, "lineWidth": shape.line_width}
-    look |= {"lighting": surface, "ambient": 0.25 if surface else 1.0, "diffuse": 0.75 if surface else 0.0, "specular": 0.0}
+    look: dict[str, Any] = {"color": list(shape.color), "diffuseColor": list(shape.color), "opacity": shape.opacity, "lineWidth": 1.0}
+    look |= {"lighting": shaded, "ambient": 0.25 if shaded else 1.0, "diffuse": 0.75 if shaded else 0.0, "specular": 0.0}
     polydata = {"parent": f"{name}.mapper", "id": f"{name}.data", "type": "vtkPolyData", "properties": data}
     mapper = {
         "parent": name,

@@ -1,10 +1,11 @@
-"""Numbers as people read them: few digits, units, powers of ten as such."""
+"""Numbers as a report's tables say them: of any kind, unknown ones too, with as many digits as a reader may want to copy."""
 
 import math
 from typing import Any
 
+from viz.numbers import power_of_ten
+
 UNKNOWN = "–"
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: Any, digits: int = 4) -> str:
@@ -26,12 +27,12 @@ def number(value: Any, digits: int = 4) -> str:
         mantissa, exponent = text.split("e")
         if 0 < int(exponent) < 12:
             return f"{value:,.0f}".replace("-", "−")
-        return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+        return f"{mantissa} × {power_of_ten(int(exponent))}".replace("-", "−")
     if abs(value) >= 1_000:
         return f"{value:,.0f}".replace("-", "−")
     if 0 < abs(value) < 1e-3:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+        return f"{mantissa} × {power_of_ten(int(exponent))}".replace("-", "−")
     return text.replace("-", "−")
 
 
@@ -48,7 +49,7 @@ def with_error(value: Any, error: Any) -> str:
         power = math.floor(math.log10(abs(value)))
         scale = 10.0**power
         shown = max(0, places + power)
-        return f"({value / scale:.{shown}f} ± {error / scale:.{shown}f}) × 10{str(power).translate(_SUPERSCRIPT)}".replace("-", "−")
+        return f"({value / scale:.{shown}f} ± {error / scale:.{shown}f}) × {power_of_ten(power)}".replace("-", "−")
     return f"{value:,.{max(0, places)}f} ± {error:,.{max(0, places)}f}".replace("-", "−")
 
 
@@ -83,7 +84,7 @@ def size(count: float) -> str:
 def seconds(value: float) -> str:
     """A length of time.
 
-    >>> seconds(0.0185), seconds(9.2972), seconds(754.0)
+    >>> seconds(0.0187), seconds(9.2972), seconds(754.0)
     ('19 ms', '9.3 s', '12 min 34 s')
     """
     if value < 0.1:

@@ -12,8 +12,8 @@ from queries.run import Run
 class Picture:
     """A picture and what is to be said of it.
 
-    ``file``: a PNG (or GIF); ``alt``: what it shows, for those who do not see it; ``figures``: quantities by name; ``files``: what else belongs to it,
-    by kind (gif, vtp, glb), which is copied beside it and linked.
+    ``file``: a PNG (or GIF); ``alt``: what it shows, for those who do not see it; ``figures``: quantities by name; ``files``: what else belongs to
+    it, by kind (gif, vtp, glb), which is copied beside it and linked.
     """
 
     name: str

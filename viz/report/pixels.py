@@ -18,7 +18,7 @@ F32 = npt.NDArray[np.float32]
 def write_pixels(
     file: pathlib.Path, image: F32, block: int, found: PixelClasses | None, colors: Sequence[str], pictures: Sequence[Mapping[str, str]]
 ) -> None:
-    """Write ``window.pathspacePixels``: radiance of each cell, its classes and their shares, names and colors of classes, and the pictures to look at.
+    """Write ``window.pathspacePixels``: radiance of each cell, its classes and their shares, names and colors of classes, pictures to look at.
 
     ``image``: linear radiance, float32 (height, width, 3), averaged over cells of ``block`` pixels to a side; ``pictures``: label and file of each.
     """
@@ -38,9 +38,10 @@ def write_pixels(
     }
     if found is not None:
         named = zip(found.named, colors, strict=True)
+        words = [short_words(name.description, name.expression) for name in found.named]
         data["names"] = [
-            {"expression": name.expression, "description": short_words(name.description, name.expression), "color": color, "share": round(name.share, 6)}
-            for name, color in named
+            {"expression": name.expression, "description": said, "color": color, "share": round(name.share, 6)}
+            for said, (name, color) in zip(words, named, strict=True)
         ]
         data |= {"classes": _packed(found.classes, "u1"), "parts": _packed(found.parts, "<u2")}
     file.parent.mkdir(parents=True, exist_ok=True)
@@ -55,7 +56,8 @@ def cell_means(image: F32, block: int) -> F32:
     y, x = np.arange(0, height, block), np.arange(0, width, block)
     sums = np.add.reduceat(np.add.reduceat(image.astype(np.float64), y, axis=0), x, axis=1)
     sizes = np.minimum(block, height - y)[:, None] * np.minimum(block, width - x)[None, :]
-    return (sums / sizes[..., None]).astype(np.float32)
+    means: F32 = (sums / sizes[..., None]).astype(np.float32)
+    return means
 
 
 def class_colors(count: int) -> list[str]:

@@ -17,7 +17,9 @@ EDGE: Color = (0.52, 0.56, 0.64)
 _WALL_OPACITY, _OPACITY, _LAMP_OPACITY, _EDGE_OPACITY = 0.07, 0.22, 0.8, 0.7
 
 
-def scene_model(run: "Run", name: str, shapes: Sequence[Shape], caption: str, alt: str, picture: pathlib.Path | None = None, eye: Eye | None = None) -> Model:
+def scene_model(
+    run: "Run", name: str, shapes: Sequence[Shape], caption: str, alt: str, picture: pathlib.Path | None = None, eye: Eye | None = None
+) -> Model:
     """A model of some light (``shapes``) in the run's scene; ``eye``: where it is first seen from (None: the job's camera).
 
     Raises ``QueryError`` for a run that does not store its surfaces.
@@ -28,7 +30,7 @@ def scene_model(run: "Run", name: str, shapes: Sequence[Shape], caption: str, al
 def job_eye(run: "Run") -> Eye:
     """The job's camera; a model is turned around the point that it looks at, so that is moved to the depth of the scene's middle."""
     from viz.cameras import job_pose
-    from viz.scene_meshes import scene_meshes
+    from viz.scene.meshes import scene_meshes
 
     pose = job_pose(run)
     points = np.concatenate([np.empty((0, 3)), *(mesh.points for mesh in scene_meshes(run))])
@@ -43,15 +45,15 @@ def scene_shapes(run: "Run") -> list[Shape]:
     """The scene's surfaces and the edges of its objects; walls, which hold the rest, are the most translucent."""
     import pyvista
 
-    from viz.outlines import creased
-    from viz.scene_meshes import scene_meshes
-    from viz.shell import walls
+    from viz.scene.meshes import scene_meshes
+    from viz.scene.outlines import creased
+    from viz.scene.shell import walls
 
     meshes = list(scene_meshes(run))
     shapes, edges = [], []
     for mesh, outer in zip(meshes, walls(meshes), strict=True):
         opacity = _LAMP_OPACITY if mesh.emits else _WALL_OPACITY if bool(np.any(outer)) else _OPACITY
-        shapes.append(Shape(mesh.mesh, LAMP if mesh.emits else SURFACE, opacity=opacity))
+        shapes.append(Shape(mesh.mesh, LAMP if mesh.emits else SURFACE, opacity=opacity, shines=mesh.emits))
         edges.append(creased(mesh.points, mesh.triangles).edges)
     ends = np.concatenate(edges).reshape(-1, 3) if edges else np.empty((0, 3))
     lines = np.column_stack([np.full(len(ends) // 2, 2), np.arange(len(ends)).reshape(-1, 2)])

@@ -17,7 +17,7 @@ from viz.report.numbers import number, percent, seconds, size, with_error
 from viz.report.picture import Picture
 from viz.report.tables import Cell, Column, Table, answer_table, heading, short_words
 
-DrawClass = Callable[[str, str, str | None], Picture | None]
+DrawClass = Callable[[str, str], Picture | None]  # a name, and the expression that selects what is to be drawn
 TOP_CLASSES = 30  # rows that are shown before a reader asks for more
 MOST_CLASSES = 200
 MOST_ROWS, FIRST_ROWS = 40, 12  # of diagnostics: at all, and before a reader asks for more
@@ -37,7 +37,8 @@ _RANKING_MEANINGS = {
     "ring_share": "its share of the light in the ring around the region",
     "expression": "selects the class",
 }
-_LEFT_OUT = ("trusted", "supported", "paths", "ring_samples", "outer_flux", "outer_flux_error", "ring_verdict", "selection", "cumulative_error")  # of rankings: a table to be read, beside files that have all
+# Columns of rankings that only the files have, which hold all of them
+_LEFT_OUT = ("trusted", "supported", "paths", "ring_samples", "outer_flux", "outer_flux_error", "ring_verdict", "selection", "cumulative_error")
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,10 @@ def rankings(run: Run, draw: DrawClass | None, top: int) -> list[Ranking]:
             continue
         answer = _read(file)
         asked = known.get("asked") or {}
-        region = asked.get("region")
         shown = answer.select([column for column in answer.schema.names if column not in _LEFT_OUT])
         title = f"{name}: {_asked(asked)}"
-        found.append(Ranking(name, title, answer_table(f"Ranking {title}", shown, explained=_RANKING_MEANINGS), _drawn(name, answer, region, draw, top)))
+        table = answer_table(f"Ranking {title}", shown, explained=_RANKING_MEANINGS)
+        found.append(Ranking(name, title, table, _drawn(name, answer, draw, top)))
     return found
 
 
@@ -144,12 +145,13 @@ def _asked(asked: Mapping[str, Any]) -> str:
     return f"{where}{at}, by {asked.get('by', 'contribution')}"
 
 
-def _drawn(name: str, answer: pa.Table, region: str | None, draw: DrawClass | None, top: int) -> list[tuple[int, Picture]]:
-    """Pictures of the first classes: a class that cannot be drawn has none."""
+def _drawn(name: str, answer: pa.Table, draw: DrawClass | None, top: int) -> list[tuple[int, Picture]]:
+    """Pictures of the first classes, of their paths in the region where there is one: a class that cannot be drawn has none."""
     if draw is None:
         return []
-    rows = answer.slice(0, top).select(["rank", "expression"]).to_pylist()
-    drawn = [(row["rank"], draw(f"{name}-{row['rank']:02d}", row["expression"], region)) for row in rows]
+    selects = "selection" if "selection" in answer.schema.names else "expression"
+    rows = answer.slice(0, top).select(["rank", selects]).to_pylist()
+    drawn = [(row["rank"], draw(f"{name}-{row['rank']:02d}", row[selects])) for row in rows]
     return [(rank, picture) for rank, picture in drawn if picture is not None]
 
 

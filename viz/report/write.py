@@ -21,6 +21,7 @@ from viz.report.numbers import number, percent, seconds, size
 from viz.report.picture import Picture, run_views
 from viz.report.pixels import class_colors, write_pixels
 from viz.report.sections import DrawClass
+from viz.report.tables import heading
 
 F32 = npt.NDArray[np.float32]
 Answer = tuple[str, pa.Table | str]  # what it shows, and its table or why there is none
@@ -31,7 +32,7 @@ _STATIC = ("report.css", "report.js", "inspector.js")
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture inside the report: ``file`` and ``links`` (label, file, size) are relative to its folder; ``left`` names files that were too large."""
+    """A picture inside the report: ``file`` and ``links`` (label, file, size) are relative to its folder; ``left``: files that were too large."""
 
     name: str
     caption: str
@@ -60,9 +61,10 @@ def write_report(
     """Write the report of a run as a folder; the path of its page, ``index.html``, which opens from disk without a network.
 
     ``pictures``: further pictures beside the run's own views; ``models``: scenes that can be turned; ``answers``: further diagnostics by name;
-    ``command``: what makes the run again (default: as far as the run knows); ``draw``: draws a class of a ranking, given a name for it, its
-    expression and its region (None: the whole image), ``top`` of each ranking. A report that lies in ``folder`` is replaced. The same run gives the same
-    bytes. Raises ``QueryError`` where the folder holds something else, or a model is too large; ``RunError`` where the run's image cannot be read.
+    ``command``: what makes the run again (default: as far as the run knows); ``draw``: draws a class of a ranking, given a name for it and
+    the expression that selects its paths, for the first ``top`` of each ranking. A report that lies in ``folder`` is replaced. The same run gives
+    the same bytes. Raises ``QueryError`` where the folder holds something else, or a model is too large; ``RunError`` where the run's image, or one
+    of its rankings, cannot be read.
     """
     _refuse_foreign(folder)
     work = folder.with_name(f".{folder.name}.tmp")
@@ -79,7 +81,7 @@ def write_report(
 
 def _refuse_foreign(folder: pathlib.Path) -> None:
     if folder.exists() and not (folder / MARK).is_file() and (not folder.is_dir() or any(folder.iterdir())):
-        raise QueryError(f"expected a new folder for the report, or an older report to replace, found something else at `{folder}`: name another folder")
+        raise QueryError(f"expected no folder at `{folder}`, or an older report to replace, found something else: name another folder")
 
 
 def _fill(
@@ -192,9 +194,10 @@ class _Copier:
         stem = f"{kind}-{slug(picture.name)}"
         file = self.copy(picture.file, stem)
         small = {key: path for key, path in picture.files.items() if path.stat().st_size <= _LARGEST_FILE}
-        links = [(key, self.copy(path, f"{stem}-{slug(key)}" if path.suffix == ".png" else stem), size(path.stat().st_size)) for key, path in small.items()]
+        stems = {key: f"{stem}-{slug(key)}" if path.suffix == ".png" else stem for key, path in small.items()}
+        links = [(key, self.copy(path, stems[key]), size(path.stat().st_size)) for key, path in small.items()]
         left = [f"{path.name} ({size(path.stat().st_size)})" for key, path in picture.files.items() if key not in small]
-        figures = [(sections.heading(key), number(value) if isinstance(value, (int, float)) else str(value)) for key, value in picture.figures.items()]
+        figures = [(heading(key), number(value) if isinstance(value, (int, float)) else str(value)) for key, value in picture.figures.items()]
         return Shown(picture.name, picture.caption, picture.alt, file, *_size(self._work / file), figures=figures, links=links, left=left)
 
     def image(self, name: str, caption: str, alt: str, expression: str) -> Shown | None:

@@ -1,4 +1,4 @@
-"""Arrows: where the light at a point comes from, grouped by its last interactions (thesis 8.1, reiner2014)."""
+"""Arrows: where the light at a point comes from, grouped by its last interactions (thesis 8.1, reiner2012)."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -6,21 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from queries.luminance import luminance_of
 from queries.regions.description import Length
-from viz.measures import (
-    IN_SPACE,
-    ON_SURFACES,
-    count,
-    figures,
-    luminance,
-    measured,
-    nothing_arrives,
-    percent,
-    sentences,
-    share_of,
-    what_light,
-    whose_walks,
-)
+from viz.measures import IN_SPACE, ON_SURFACES, figures, nothing_arrives, sentences, what_light, whose_walks
+from viz.numbers import count, measured, percent, share_of
 from viz.tools.base import Color, Drawn, WalkTool
 from viz.tools.probes import MOST_PROBES, ProbeSection, diagonal, marker, places, probes_of
 
@@ -89,7 +78,7 @@ class Arrows(WalkTool):
             return Drawn(nothing_arrives(selection, run, self.walks, f"at {places(probes)}"), figures={"probes": len(probes)}, empty=True)
         colors = self._colors(run, found)
         width = self.width or WIDTH * diagonal(run)
-        brightest = max(float(luminance(light.value)) for light in found)
+        brightest = max(float(luminance_of(light.value)) for light in found)
         meshes: dict[str, pyvista.PolyData] = {}
         for i, (probe, light) in enumerate(zip(probes, found)):
             if light.arrows:
@@ -118,12 +107,12 @@ class Arrows(WalkTool):
 
         parts, tails = [], self._tails(run, probe, light)
         for i, cluster in enumerate(light.arrows):
-            radius = width * float(np.sqrt(luminance(cluster.value) / brightest))
+            radius = width * float(np.sqrt(luminance_of(cluster.value) / brightest))
             parts.append(arrow(tails[i], self._tip(probe, light, i, tails), radius))
         found = joined(parts)
         mesh: pyvista.PolyData = found.surface()
         row = np.repeat(np.arange(len(parts)), [len(part.points) for part in parts])
-        flux = np.array([luminance(cluster.value) for cluster in light.arrows])
+        flux = np.array([luminance_of(cluster.value) for cluster in light.arrows])
         shades = np.array([self._shade(cluster, colors) for cluster in light.arrows])
         columns = {
             "arrow": np.arange(len(parts)),
@@ -185,7 +174,7 @@ class Arrows(WalkTool):
         """The arrows with their shares, the strongest first; an arrow to another one's tail follows it, with a sign for each step back."""
         lines: list[tuple[str, Color]] = []
         for i, light in enumerate(found):
-            total = float(luminance(light.value))
+            total = float(luminance_of(light.value))
             for row in _as_tree(light):
                 cluster = light.arrows[row]
                 back, probe = BACK * (cluster.level - 1), f"{i + 1}: " if len(found) > 1 else ""
@@ -211,7 +200,7 @@ class Arrows(WalkTool):
         if len(found) > 1:
             return f"{segments}{left}."
         quantity = (IN_SPACE if self.probes[0].normal is None else ON_SURFACES)[self.walks]
-        value = measured(float(luminance(found[0].value)), found[0].value_error)
+        value = measured(float(luminance_of(found[0].value)), found[0].value_error)
         return f"{quantity.name.capitalize()} {value} {quantity.unit}, {segments}{left}."
 
     def _figures(self, found: "list[Clusters]") -> dict[str, float | int | str]:
@@ -219,7 +208,7 @@ class Arrows(WalkTool):
         for i, (light, section) in enumerate(zip(found, self.probes)):
             name = (IN_SPACE if section.normal is None else ON_SURFACES)[self.walks].name.replace(" ", "_")
             known |= {
-                f"probe_{i + 1}_{name}": float(luminance(light.value)),
+                f"probe_{i + 1}_{name}": float(luminance_of(light.value)),
                 f"probe_{i + 1}_standard_error": light.value_error,
                 f"probe_{i + 1}_segments": light.count,
                 f"probe_{i + 1}_arrows": len(light.arrows),

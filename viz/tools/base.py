@@ -25,7 +25,7 @@ Area = Annotated[tuple[Number, Number, Number, Number], Field(strict=False)]
 
 @dataclass(frozen=True)
 class ColorBar:
-    """What colors mean: ``colors`` uint8 (256, 3) from ``low`` to ``high``, on a logarithmic scale or a linear one. ``label`` names quantity and unit."""
+    """What colors mean: uint8 (256, 3), from ``low`` to ``high``, on a logarithmic scale or a linear one. ``label`` names quantity and unit."""
 
     label: str
     colors: U8

@@ -23,7 +23,8 @@ I64 = npt.NDArray[np.int64]
 Part = Literal["event", "object", "material", "normal"]
 
 MEMORY = 1.5e9  # bytes, at most, of what is drawn
-BYTES_PER_POINT = 64  # a point's place, colors and numbers, here and once more where OpenGL draws it
+BYTES_PER_POINT = 72  # a point's place, colors and numbers, here and once more where OpenGL draws it, as measured with `weigh: width`
+BYTES_PER_SEGMENT = 400  # beside its points: its ends, its vertices, its bundle and its path
 DENSE = 6_000_000  # points from which pictures are not supersampled: lines lie upon lines, and it would take four times as many pixels
 MOST_NAMES = 12  # in the legend
 _WIDTHS = (0.4, 0.8, 1.4, 2.4)  # of lines, from least to most light, as multiples of `line_width`
@@ -95,7 +96,7 @@ class Bundles(Tool):
         """As many paths as are asked for and fit."""
         from queries.path_sample import sample_paths
 
-        room = int(MEMORY // (BYTES_PER_POINT * self.points))  # segments
+        room = self._room()
         most = min(self.most, room)
         while True:
             sample = sample_paths(run, selection, most, self.choose, self.seed)
@@ -103,6 +104,10 @@ class Bundles(Tool):
             if segments <= room:
                 return sample
             most = max(1, int(min(most, len(sample)) * 0.98 * room / segments))
+
+    def _room(self) -> int:
+        """How many segments fit into memory."""
+        return max(1, int(MEMORY // (BYTES_PER_POINT * self.points + BYTES_PER_SEGMENT)))
 
     def _codes(self, run: "Run", sample: "PathSample") -> I64:
         """What tells the kinds of vertices apart."""
@@ -120,7 +125,7 @@ class Bundles(Tool):
 
     def _colors(self, run: "Run", sample: "PathSample", paths: "BundledPaths") -> tuple[F32, tuple[tuple[str, Color], ...]]:
         """The color of each segment, float32 (s, 3), and what colors mean."""
-        from viz.colors import chrominance, object_colors
+        from viz.colors import as_color, chrominance, object_colors
 
         if self.color == "chrominance":
             return chrominance(sample.contribution)[paths.segments.path], ()
@@ -131,7 +136,7 @@ class Bundles(Tool):
         for row in run.tables["objects"].to_pylist():
             names[row["object"]] = row["name"]
         largest = [int(i) for i in np.argsort(-shares, kind="stable")[:MOST_NAMES] if shares[i]]
-        legend = [(names[i], _color(palette[i])) for i in largest]
+        legend = [(names[i], as_color(palette[i])) for i in largest]
         return palette[left], tuple(legend)
 
     def _show(self, stage: "Stage", sample: "PathSample", paths: "BundledPaths", colors: F32) -> None:
@@ -175,7 +180,7 @@ class Bundles(Tool):
 
     def _only_dark_left(self, sample: "PathSample") -> bool:
         """Whether fewer were drawn than there are because the others bring no light, not because of memory."""
-        room = int(MEMORY // (BYTES_PER_POINT * self.points))
+        room = self._room()
         return self.choose == "contribution" and self.most <= room and len(sample.event) - len(sample) <= room
 
 
@@ -191,10 +196,11 @@ def _mesh(run: "Run", sample: "PathSample", paths: "BundledPaths", colors: F32) 
     """The curves, with what is known of each segment: where its path is in the sample and in the run, its place in the path, from the emitter, …"""
     from viz.bundles.names import bundle_names, class_words
     from viz.bundles.polylines import polyline_mesh
+    from viz.colors import as_bytes
 
     segments, path = paths.segments, paths.segments.path
     classes, words = class_words(run, sample)
-    flat = np.rint(255 * colors).astype(np.uint8)
+    flat = as_bytes(colors)
     mesh = polyline_mesh(paths.curves, np.repeat(flat[:, None], paths.curves.shape[1], axis=1))
     cells: dict[str, npt.NDArray[Any]] = {
         "path_id": path,
@@ -214,16 +220,12 @@ def _mesh(run: "Run", sample: "PathSample", paths: "BundledPaths", colors: F32) 
 
 def _weights(sample: "PathSample") -> F32:
     """How strongly each path is drawn, 0 … 1, float32 (n): the square root of its contribution's luminance, relative to that of bright paths."""
-    from queries.kernels.luminance import LUMINANCE
+    from queries.priority import by_luminance
 
-    light = np.nan_to_num(np.maximum(sample.contribution.astype(np.float64) @ np.asarray(LUMINANCE, np.float64), 0), posinf=0.0)
+    light = by_luminance(sample.contribution)
     bright = float(np.quantile(light, _BRIGHT)) or float(light.max(initial=0)) or 1.0
     return np.sqrt(np.minimum(light / bright, 1)).astype(np.float32)
 
 
 def _counts(sample: "PathSample") -> dict[str, float | int | str]:
     return {"paths_found": sample.found, "paths_drawn": len(sample)}
-
-
-def _color(rgb: F32) -> Color:
-    return float(rgb[0]), float(rgb[1]), float(rgb[2])

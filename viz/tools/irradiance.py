@@ -6,22 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from queries.luminance import luminance_of
 from queries.regions.description import Length, Number
-from viz.measures import (
-    ON_SURFACES,
-    TOTAL,
-    Quantity,
-    count,
-    figures,
-    luminance,
-    measured,
-    nothing_arrives,
-    percent,
-    sentences,
-    what_light,
-    whose_walks,
-)
-from viz.ticks import number
+from viz.measures import ON_SURFACES, TOTAL, Quantity, figures, nothing_arrives, sentences, what_light, whose_walks
+from viz.numbers import count, measured, number, percent
 from viz.tools.base import Drawn, WalkTool
 
 if TYPE_CHECKING:
@@ -71,10 +59,11 @@ class Irradiance(WalkTool):
             raise ValueError(f"expected `range` as [low, high], low below high, found {list(self.range)}")
         if self.range is not None and self.scale == "log" and self.range[0] <= 0:
             raise ValueError(f"expected a `range` above 0 on a logarithmic scale, found {list(self.range)}")
-        misplaced = {"surface": {"neighbors"}, "image": {"patch", "smooth"}}[self.space] & self.model_fields_set
-        if misplaced:
-            other = "image" if self.space == "surface" else "surface"
-            raise ValueError(f"`{min(misplaced)}` belongs to `space: {other}`: leave it out of `space: {self.space}`")
+        other, foreign = ("image", ("neighbors",)) if self.space == "surface" else ("surface", ("patch", "smooth"))
+        fields = type(self).model_fields
+        for name in foreign:
+            if getattr(self, name) != fields[name].default:
+                raise ValueError(f"`{name}` belongs to `space: {other}`: leave it out of `space: {self.space}`")
         return self
 
     @property
@@ -98,10 +87,10 @@ class Irradiance(WalkTool):
         size = self.patch or patch_size(run, self.walks, objects)
         cut = patches(run.geometry, size, objects)
         found = irradiance(run, selection, cut, self.walks)
-        arrivals, total = int(found.hits.sum()), float(luminance(found.flux))
+        arrivals, total = int(found.hits.sum()), float(luminance_of(found.flux))
         if not arrivals:
             return self._nothing(run, selection)
-        values, area = luminance(found.values), cut.area
+        values, area = luminance_of(found.values), cut.area
         lit = found.hits > 0
         error = median_error(found.error[lit], values[lit], area[lit])
         surface = PatchSurface(cut)
@@ -147,7 +136,7 @@ class Irradiance(WalkTool):
 
         width, height = film_within(run, stage.size)
         found = irradiance_image(run, selection, width, height, self.neighbors, side=self.walks, objects=shown_objects(run, stage))
-        values = luminance(found.values)
+        values = luminance_of(found.values)
         if not found.hits or not (values > 0).any():
             return self._nothing(run, selection)
         seen, lit = found.seen, found.seen & (values > 0)
@@ -158,7 +147,7 @@ class Irradiance(WalkTool):
             [
                 f"{self.quantity.name.capitalize()} in false color, as the job's camera sees the surfaces.",
                 f"{what_light(selection, self.walks)}: {count(found.hits, 'arrival')} from {whose_walks(run, self.walks)}; each pixel is the mean "
-                f"over a disc that holds {self.neighbors:,} of them, of radius {number(found.radius)} world units at most.",
+                f"over a disc that grows until it holds {self.neighbors:,} of them, or to a radius of {number(found.radius)} world units.",
                 self._ends(scale, values[seen], np.ones(int(seen.sum())), "picture"),
                 f"Half of the lit pixels are known to {percent(error)} or better.",
             ]

@@ -7,8 +7,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from queries.errors import QueryError
 from queries.regions.description import Length
+from viz.colors import ColorMap
 from viz.grids import BoxField
+from viz.measures import IN_SPACE, TOTAL
+from viz.numbers import percent
 from viz.tools.base import ColorBar, Drawn, WalkTool
 
 if TYPE_CHECKING:
@@ -22,10 +26,12 @@ F64 = npt.NDArray[np.float64]
 U8 = npt.NDArray[np.uint8]
 
 MOST_FRAMES = 1000
+MOST_POSITIONS = 10_000_000  # of all particles together: some 30 bytes each
 STEP = 0.5  # of a voxel's shortest side
 TRAIL = 1 / 14  # of the grid's diagonal, unless `trail` says otherwise
 WAY = 1 / 2  # likewise, how far a particle drifts in an animation
-LABELS = {"anisotropy": "anisotropy: net flow over fluence", "fluence": "fluence (flux / world unit²)"}
+FLUENCES = (0.02, 0.999)  # shares of the voxels with light below the ends of the scale
+ANISOTROPY = "anisotropy: net flow over fluence"
 
 
 class Particles(WalkTool):
@@ -45,7 +51,7 @@ class Particles(WalkTool):
     color: Literal["chrominance", "anisotropy", "fluence"] = Field(
         default="anisotropy", description="By the color of the light, by how directed it is, or by how much there is (logarithmic)."
     )
-    map: Literal["viridis", "cividis", "magma", "inferno", "turbo", "gray"] = Field(default="viridis", description="The color map of numbers.")
+    map: ColorMap = Field(default="viridis", description="The color map of numbers.")
     trail: Length | None = Field(default=None, description="The length of trails, world units. Default: 1/14 of the box's diagonal.")
     way: Length | None = Field(default=None, description="How far particles drift in an animation, world units. Default: half of the box's diagonal.")
     frames: Annotated[int, Field(ge=1, le=MOST_FRAMES)] = Field(default=1, description="1: a still picture. More: particles move, and begin anew.")
@@ -57,13 +63,13 @@ class Particles(WalkTool):
         from queries.flow import flow
         from queries.inspection import walks_of
         from viz.comets import Comets
-        from viz.grids import grid_of
-        from viz.ticks import number
+        from viz.grids import beyond, grid_of
+        from viz.numbers import number
 
         selection = self.selection(run)
         grid = grid_of(run, self.box, self.resolution)
         with walks_of(run, self.walks) as walks:
-            field = flow(walks, selection, grid, self.walks)
+            field, outside = flow(walks, selection, grid, self.walks), beyond(walks, grid, self.walks)
         what = ("Light" if self.walks == "light" else "Importance") + (f" {selection.describe()}" if selection.describe() else "")
         if not field.total > 0:
             return Drawn(caption=f"Particle flow: {what[0].lower()}{what[1:]} does not pass here.", empty=True)
@@ -72,14 +78,20 @@ class Particles(WalkTool):
         figures: dict[str, float | int | str] = {
             "directed_share": share,
             "mean_anisotropy": float(np.average(field.anisotropy, weights=field.fluence)),
-            "total_flux_times_length": field.total,
+            f"total_{TOTAL[self.walks].unit}_times_length": field.total,
             "segments": field.segments,
             "voxels": f"{nx} x {ny} x {nz}",
         }
         diagonal = float(np.linalg.norm(grid.cell * grid.shape))
         trail, way = self.trail or TRAIL * diagonal, self.way or WAY * diagonal
+        length, step = way if self.frames > 1 else trail, STEP * float(grid.cell.min())
+        if self.most * length > MOST_POSITIONS * step:
+            raise QueryError(
+                f"expected particles whose ways fit into memory, found {self.most:,} that go {number(length)} units in steps of {number(step)}: "
+                f"ask for fewer (`most`), or for a `{'way' if self.frames > 1 else 'trail'}` of at most {number(MOST_POSITIONS * step / self.most)}"
+            )
         seeds = field.seeds(self.most, self.least_anisotropy, self.seed)
-        tracks = field.tracks(seeds, way if self.frames > 1 else trail, STEP * float(grid.cell.min()), self.least_anisotropy)
+        tracks = field.tracks(seeds, length, step, self.least_anisotropy)
         if not (tracks.count > 1).any():
             nowhere = f"{what} has no dominant direction anywhere here (net flow above {number(self.least_anisotropy)} of the fluence)"
             return Drawn(caption=f"{nowhere}: there is nothing for particles to follow.", figures=figures, empty=True)
@@ -90,8 +102,8 @@ class Particles(WalkTool):
         show[0]()
         return Drawn(
             caption=f"{what}: {len(tracks):,} particles follow its net flow through {nx} x {ny} x {nz} voxels, from {field.segments:,} segments of "
-            f"{self.walks} walks. {_percent(share)} of it has a dominant direction (net flow above {number(self.least_anisotropy)} of the fluence); "
-            "particles move there alone. Their ways are not light paths.",
+            f"{self.walks} walks. {percent(share)} of it has a dominant direction (net flow above {number(self.least_anisotropy)} of the fluence); "
+            f"particles move there alone. Their ways are not light paths.{outside}",
             legend=(("color of the light, without its brightness", (1.0, 1.0, 1.0)),) if bar is None else (),
             color_bar=bar,
             figures=figures | {"particles": len(tracks), "trail_world_units": trail_steps * tracks.step},
@@ -111,23 +123,16 @@ class Particles(WalkTool):
 
     def _colors(self, field: "Flow", tracks: "Tracks") -> tuple[U8, ColorBar | None]:
         """The color of each position of each particle, uint8 (n, steps + 1, 3), and what it means."""
-        from viz.colors import chrominance, color_map
+        from viz.colors import as_bytes, chrominance
+        from viz.false_color import FalseColor
 
-        voxels = field.at(tracks.points.reshape(-1, 3))
-        shape = (*tracks.points.shape[:2], 3)
+        voxels = tuple(index.reshape(tracks.points.shape[:2]) for index in field.at(tracks.points.reshape(-1, 3)))
         if self.color == "chrominance":
-            return np.rint(255 * chrominance(field.rgb[voxels])).astype(np.uint8).reshape(shape), None
-        colors = color_map(self.map)
+            return as_bytes(chrominance(field.rgb[voxels])), None
         if self.color == "anisotropy":
-            place, low, high = field.anisotropy[voxels], 0.0, 1.0
+            label, values, scale = ANISOTROPY, field.anisotropy, FalseColor(self.map, 0.0, 1.0, logarithmic=False)
         else:
-            there = field.fluence[field.fluence > 0]
-            low, high = (float(np.quantile(there, q)) for q in (0.02, 0.999))
-            low = min(low, high / 2)
-            place = np.log(np.maximum(field.fluence[voxels], low) / low) / np.log(high / low)
-        found = colors[np.rint(255 * np.clip(place, 0, 1)).astype(np.int64)].reshape(shape)
-        return found, ColorBar(LABELS[self.color], colors, low, high, self.color == "fluence")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.3g} %"
+            label, values, there = IN_SPACE[self.walks].label, field.fluence, field.fluence[field.fluence > 0]
+            low, high = (float(np.quantile(there, share)) for share in FLUENCES)
+            scale = FalseColor(self.map, min(low, high / 2), high, logarithmic=True)
+        return scale.colors(values[voxels]), scale.bar(label)

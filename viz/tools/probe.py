@@ -1,4 +1,4 @@
-"""Spherical plots: light that arrives at a point, as a surface around it (thesis 8.1, reiner2014)."""
+"""Spherical plots: light that arrives at a point, as a surface around it (thesis 8.1, reiner2012)."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -6,23 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from queries.luminance import luminance_of
 from queries.regions.description import Length
-from viz.measures import (
-    FROM_DIRECTIONS,
-    IN_SPACE,
-    LIGHT,
-    ON_SURFACES,
-    Quantity,
-    count,
-    figures,
-    luminance,
-    measured,
-    nothing_arrives,
-    sentences,
-    what_light,
-    whose_walks,
-)
-from viz.ticks import number
+from viz.measures import FROM_DIRECTIONS, IN_SPACE, LIGHT, ON_SURFACES, Quantity, figures, nothing_arrives, sentences, what_light, whose_walks
+from viz.numbers import count, measured, number
 from viz.tools.base import Color, Drawn, WalkTool
 from viz.tools.probes import MOST_PROBES, ProbeSection, diagonal, marker, places, probes_of
 
@@ -71,7 +58,7 @@ class SphericalPlot(WalkTool):
         if not any(light.count for light in found):
             return Drawn(nothing_arrives(selection, run, self.walks, f"at {places(probes)}"), figures={"probes": len(probes)}, empty=True)
         radiance = [self._smoothed(light) for light in found]
-        peaks = [float(luminance(values).max()) for values in radiance]
+        peaks = [float(luminance_of(values).max()) for values in radiance]
         meshes: dict[str, pyvista.PolyData] = {}
         legend: list[tuple[str, Color]] = []
         rings = distinct_colors(len(probes)) if len(probes) > 1 else np.full((1, 3), 0.85 if stage.look.dark else 0.3, np.float32)
@@ -103,7 +90,7 @@ class SphericalPlot(WalkTool):
         from viz.glyphs import radial_surface
 
         bands, sectors, _ = radiance.shape
-        distances = size * (np.maximum(luminance(radiance), 0) / peak) ** self.power
+        distances = size * (np.maximum(luminance_of(radiance), 0) / peak) ** self.power
         found = radial_surface(np.array(light.probe.position), light.directions, distances, closed=light.probe.normal is None)
         plot: pyvista.PolyData = found.surface()
         rows = _nearest_cells(bands, sectors, len(found.points))
@@ -111,7 +98,7 @@ class SphericalPlot(WalkTool):
         weights[: bands * sectors] = np.repeat(light.projected, sectors)
         of_points = radiance.reshape(-1, 3)[rows]
         plot.point_data["radiance"] = of_points.astype(np.float32)
-        plot.point_data["luminance"] = luminance(of_points).astype(np.float32)
+        plot.point_data["luminance"] = luminance_of(of_points).astype(np.float32)
         plot.point_data["solid_angle"] = weights
         plot.point_data["color"] = np.rint(255 * chrominance(of_points)).astype(np.uint8)
         return plot
@@ -131,7 +118,7 @@ class SphericalPlot(WalkTool):
 
     def _legend(self, i: int, light: "Incident") -> str:
         quantity = self._quantity(light.probe)
-        value = measured(float(luminance(light.value)), light.value_error)
+        value = measured(float(luminance_of(light.value)), light.value_error)
         return f"probe {i + 1}: {quantity.name} {value} {quantity.unit}, {count(light.count, SEGMENTS)}"
 
     def _figures(self, found: "list[Incident]", peaks: list[float]) -> dict[str, float | int | str]:
@@ -139,7 +126,7 @@ class SphericalPlot(WalkTool):
         for i, (light, peak) in enumerate(zip(found, peaks)):
             name = self._quantity(light.probe).name.replace(" ", "_")
             known |= {
-                f"probe_{i + 1}_{name}": float(luminance(light.value)),
+                f"probe_{i + 1}_{name}": float(luminance_of(light.value)),
                 f"probe_{i + 1}_standard_error": light.value_error,
                 f"probe_{i + 1}_largest_radiance": peak,
                 f"probe_{i + 1}_segments": light.count,

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from viz.segments import SegmentLayer
     from viz.stage import Stage
 
-F32 = npt.NDArray[np.float32]
-I64 = npt.NDArray[np.int64]
+F64 = npt.NDArray[np.float64]
+U8 = npt.NDArray[np.uint8]
 Times = Annotated[tuple[Number, Number], Field(strict=False)]
 
 MOST_FRAMES = 1000
@@ -70,9 +70,10 @@ class TimeOfFlight(Tool):
     def draw(self, run: "Run", stage: "Stage") -> Drawn:
         """See ``Tool``."""
         from queries.path_sample import sample_paths
+        from queries.priority import by_luminance
         from viz.flight import windows
+        from viz.numbers import number
         from viz.segments import SegmentLayer
-        from viz.ticks import number
 
         selection = self.selection(run)
         sample = sample_paths(run, selection, self.most, self.choose, self.seed)
@@ -87,11 +88,11 @@ class TimeOfFlight(Tool):
         show = [functools.partial(self._show, layer, flight, colors, span) for span in spans]
         show[0]()
         drawn = f"{len(sample):,} of {sample.found:,}" if len(sample) < sample.found else f"{len(sample):,}"
-        first, median = np.quantile(flight.arrival, [0.0, 0.5]).tolist()
+        first, median = float(flight.arrival.min()), _median(flight.arrival, sample.scale * by_luminance(sample.contribution))
         bundled = " Bundled curves are not physical paths; their ends are." if self.amount > 0 else ""
         return Drawn(
             caption=f"Light on {drawn} paths{' ' + selected if selected else ''} that has travelled {number(low)} to {number(high)} world units, "
-            f"{number(window)} a frame. The first reaches the camera after {number(first)}, half of it after {number(median)}; "
+            f"{number(window)} a frame. The first reaches the camera after {number(first)}, half of all that they bring after {number(median)}; "
             f"glass does not slow it here.{bundled}",
             legend=legend,
             figures={
@@ -130,7 +131,7 @@ class TimeOfFlight(Tool):
         window = self.window or late * WINDOW
         return 0.0, late + window, window
 
-    def _show(self, layer: "SegmentLayer", flight: "Flight", colors: npt.NDArray[np.uint8], span: tuple[float, float]) -> None:
+    def _show(self, layer: "SegmentLayer", flight: "Flight", colors: U8, span: tuple[float, float]) -> None:
         """Set the stage for one frame."""
         low, high = span
         rows, part = flight.between(low, high)
@@ -138,22 +139,22 @@ class TimeOfFlight(Tool):
         share = (ends - low) / (high - low) if self.fade else np.ones_like(ends)
         layer.show(part.begin, part.end, colors[rows], self.opacity * share)
 
-    def _colors(self, run: "Run", sample: "PathSample", flight: "Flight") -> tuple[npt.NDArray[np.uint8], tuple[tuple[str, Color], ...]]:
+    def _colors(self, run: "Run", sample: "PathSample", flight: "Flight") -> tuple[U8, tuple[tuple[str, Color], ...]]:
         """The color of each segment, uint8 (s, 3), and what colors mean."""
-        from viz.colors import chrominance, object_colors
+        from viz.colors import as_bytes, as_color, chrominance, object_colors
 
         if self.color == "chrominance":
-            return _bytes(chrominance(sample.contribution)[flight.path]), ()
+            return as_bytes(chrominance(sample.contribution)[flight.path]), ()
         if self.color == "bounce":
             bounce = np.minimum(flight.bounce, MOST_BOUNCES)
-            return _bytes(np.array(_BOUNCES, np.float32)[bounce]), tuple((_bounce_name(i), _BOUNCES[i]) for i in np.unique(bounce).tolist())
+            return as_bytes(np.array(_BOUNCES, np.float32)[bounce]), tuple((_bounce_name(i), _BOUNCES[i]) for i in np.unique(bounce).tolist())
         colors = object_colors(run)
         names = run.geometry.object_names
         left = sample.object[flight.vertex].astype(np.int64)
         left = np.where((left >= 0) & (left < len(names)), left, len(colors) - 1)
         seen = np.unique(left).tolist()
-        named = [(f"from {names[i]}" if i < len(names) else "from an emitter without a surface", _color(colors[i])) for i in seen]
-        return _bytes(colors[left]), tuple(named)
+        named = [(f"from {names[i]}" if i < len(names) else "from an emitter without a surface", as_color(colors[i])) for i in seen]
+        return as_bytes(colors[left]), tuple(named)
 
 
 def _bounce_name(bounce: int) -> str:
@@ -162,17 +163,14 @@ def _bounce_name(bounce: int) -> str:
     return f"after {bounce}{' or more' if bounce == MOST_BOUNCES else ''} interaction{'s' if bounce > 1 else ''}"
 
 
-def _bytes(colors: F32) -> npt.NDArray[np.uint8]:
-    found: npt.NDArray[np.uint8] = np.rint(255 * np.clip(colors, 0, 1)).astype(np.uint8)
-    return found
+def _median(values: F64, weights: F64) -> float:
+    """The least value up to which half of all weight lies; that of equal weights where there is none."""
+    order = np.argsort(values, kind="stable")
+    upto = np.cumsum(weights[order] if weights.any() else np.ones(len(values)))
+    return float(values[order[np.searchsorted(upto, upto[-1] / 2)]])
 
 
-def _color(color: F32) -> Color:
-    r, g, b = color.tolist()
-    return r, g, b
-
-
-def _mesh(sample: "PathSample", flight: "Flight", colors: npt.NDArray[np.uint8]) -> "pyvista.PolyData":
+def _mesh(sample: "PathSample", flight: "Flight", colors: U8) -> "pyvista.PolyData":
     """All segments, with the travelled length at their ends."""
     from viz.segments import segment_mesh
 

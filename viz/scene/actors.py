@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from viz.cameras import Pose
 from viz.look import Look
-from viz.outlines import creased, outlines
-from viz.scene_meshes import scene_meshes
-from viz.shell import walls
+from viz.scene.meshes import scene_meshes
+from viz.scene.outlines import creased, outlines
+from viz.scene.shell import walls
 
 if TYPE_CHECKING:
     from queries.run import Run
@@ -53,7 +53,7 @@ class SceneActors:
         eye = np.array(pose.position)
         for solid in self.solids:
             solid.prepare(eye, pose.axes[2])
-        self.lines.show([self.edges, *(outlines(surface, eye) for surface in self.surfaces)], eye)
+        self.lines.show([self.edges, *(outlines(surface, eye) for surface in self.surfaces)])
 
 
 class _Surface:
@@ -130,7 +130,7 @@ class _Lines:
         self.actor: Any = None
         self.plotter, self.look = plotter, look
 
-    def show(self, parts: list[F64], eye: F64) -> None:
+    def show(self, parts: list[F64]) -> None:
         """Draw these segments, (k, 2, 3) each."""
         segments = np.concatenate(parts)
         count = len(segments)

@@ -8,6 +8,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from queries.errors import QueryError
+from queries.kernels.regions import CYLINDER, DISK, SPHERE
 
 if TYPE_CHECKING:
     from queries.run import Run
@@ -16,7 +17,6 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 
 _CORNERS = [f"{axis}{corner}" for corner in range(3) for axis in "xyz"]
-_SPHERE, _DISK, _CYLINDER = range(3)  # kinds of quadrics
 _FINEST = 96  # steps around a round surface: the outline of a sphere is then within 0.05 % of its radius
 _COARSEST = 12
 _MOST_TRIANGLES = 2_000_000  # of all round surfaces together; beyond it they get coarser
@@ -99,7 +99,7 @@ def _steps(count: int) -> int:
 
 
 def _placed(kind: int, to_world: F64, steps: int) -> tuple[F64, I64]:
-    points, triangles = {_SPHERE: _sphere, _DISK: _disk, _CYLINDER: _cylinder}[kind](steps)
+    points, triangles = {SPHERE: _sphere, DISK: _disk, CYLINDER: _cylinder}[kind](steps)
     return points @ to_world[:, :3].T + to_world[:, 3], triangles
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from viz.outlines import face_normals
-from viz.scene_meshes import SceneMesh
+from viz.scene.meshes import SceneMesh
+from viz.scene.outlines import face_normals
 
 F64 = npt.NDArray[np.float64]
 
