@@ -9,7 +9,6 @@ WORKERS ?= auto
 
 demo: $(INSTALLED)
 	$(BIN)/pathspace run configs/cornell.yaml --out runs/cornell --resume
-	$(BIN)/pathspace info runs/cornell
 
 test: lint
 	$(BIN)/pytest -n $(WORKERS) -m "not slow"

@@ -26,7 +26,7 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 _EXACT = 1 << 24  # integers below this are exact in float32, the only type of attributes of our own
 _MOST_BYTES = (1 << 32) - 1  # of a .glb file
-_COLORS = ("base_color", "color")  # arrays that may be COLOR_0: the first that is there
+_COLOR = "color"  # the array that is COLOR_0
 
 
 def write_vtp(path: str | pathlib.Path, mesh: "pyvista.PolyData") -> None:
@@ -82,13 +82,13 @@ class _Document:
         opaque = True
         given = {name: np.asarray(values)[vertices] for name, values in mesh.point_data.items()}
         given |= {name: np.asarray(values)[cells] for name, values in mesh.cell_data.items() if name not in given and len(cells)}
-        shown = next((name for name in _COLORS if name in given and given[name].dtype == np.uint8), None)
+        shown = _COLOR if _COLOR in given and given[_COLOR].dtype == np.uint8 else None
         if shown is not None:
             rgba = _linear(given[shown])
             opaque = bool((rgba[:, 3] == 0xFFFF).all())
             attributes["COLOR_0"] = self._accessor(rgba, normalized=True)
         for name, values in given.items():
-            if name not in _COLORS and not name.startswith("vtk") and values.dtype.kind in "iufb" and (values.ndim == 1 or values.shape[1] <= 4):
+            if name != _COLOR and not name.startswith("vtk") and values.dtype.kind in "iufb" and (values.ndim == 1 or values.shape[1] <= 4):
                 attributes["_" + "".join(c if c.isalnum() else "_" for c in name.upper())] = self._accessor(_plain(values))
         lit = mode == _TRIANGLES
         material: dict[str, Any] = {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}, "doubleSided": True}

@@ -32,6 +32,7 @@ def artist(path: pathlib.Path, paths: int, points: int, size: tuple[int, int]) -
         sample = sample_paths(run, Selection(), paths, "uniform")
     codes = vertex_codes(sample, ("event", "object"), np.zeros(len(run.tables["objects"]), np.int64))
     curves = bundled(sample, codes, AMOUNT, points)
+    _check(sample, curves, points, run.geometry.extent)
 
     def draw() -> None:
         with Stage(run, Look(), size) as stage:
@@ -58,6 +59,14 @@ def artist(path: pathlib.Path, paths: int, points: int, size: tuple[int, int]) -
         return {"wall": watch.timing.wall * scale, "cpu": watch.timing.cpu * scale}
 
     return answer
+
+
+def _check(sample: PathSample, paths: BundledPaths, points: int, extent: float) -> None:
+    """Both must make the same curves, or it is not the same work. Raises ValueError."""
+    theirs = np.array(_bundled_in_python(sample, paths, points))
+    apart = float(np.abs(theirs - paths.curves[::EVERY]).max())
+    if apart > 1e-5 * extent:
+        raise ValueError(f"curves bundled in Python are {apart:g} world units apart from ours, in a scene of {extent:g}")
 
 
 def _bundled_in_python(sample: PathSample, paths: BundledPaths, points: int) -> list[list[tuple[float, ...]]]:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.kernel import kernel
-from queries.kernels.vertices import DEAD, Vertices
+from queries.kernels.vertices import DEAD, Vertices, read
 
 I32 = npt.NDArray[np.int32]
 U8 = npt.NDArray[np.uint8]
@@ -47,7 +47,7 @@ def fold_arrivals(automaton: WalkAutomaton, depth: U8, vertices: Vertices, begin
         before = vertices.bits[i - 1] if i > 0 else np.uint8(0)
         bits = (before & automaton.own) | (here & automaton.onward)
         if depth[i] > 1:
-            state = read_vertex(automaton, state, vertices.event[i - 1], vertices.object[i - 1], bits)
+            state = read(automaton.symbols, automaton.transitions, state, vertices.event[i - 1], vertices.object[i - 1], bits)
         elif alike:
             state = automaton.starts[0, bits]
         elif i > 0 and depth[i - 1] == 0:
@@ -55,17 +55,6 @@ def fold_arrivals(automaton: WalkAutomaton, depth: U8, vertices: Vertices, begin
         else:
             state = DEAD
         chosen[i] = state >= 0 and automaton.accepted[state, here & automaton.receiving]
-
-
-@kernel
-def read_vertex(automaton: WalkAutomaton, state: np.int32, event: np.uint8, thing: np.uint16, bits: np.uint8) -> np.int32:
-    """The state after one more interaction."""
-    if state < 0 or event >= automaton.symbols.shape[0] or thing >= automaton.symbols.shape[1]:
-        return DEAD
-    symbol = automaton.symbols[event, thing, bits]
-    if symbol < 0:
-        return DEAD
-    return np.int32(automaton.transitions[state, symbol])
 
 
 @kernel

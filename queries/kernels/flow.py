@@ -8,7 +8,6 @@ from queries.kernel import kernel
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
-Vec = tuple[float, float, float]
 
 
 @kernel

@@ -17,7 +17,7 @@ NONE = np.int32(-1)
 LONGEST = 256  # letters that a string of one walk may have
 SYMBOL_BITS = np.uint64(24)
 ONE = np.uint64(1)
-S29, S30, S31 = np.uint64(29), np.uint64(30), np.uint64(31)
+S30, S31 = np.uint64(30), np.uint64(31)
 MIX_1, MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 
 

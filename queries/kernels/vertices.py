@@ -78,14 +78,16 @@ def mark_used(prefixes: Prefixes, used: Chosen) -> None:
 
 
 @kernel
-def read(automaton: Automaton, state: np.int32, event: np.uint8, thing: np.uint16, bits: np.uint8) -> np.int32:
+def read(
+    symbols: npt.NDArray[np.int32], transitions: npt.NDArray[np.int32], state: np.int32, event: np.uint8, thing: np.uint16, bits: np.uint8
+) -> np.int32:
     """The state after one more interaction."""
-    if state < 0 or event >= automaton.symbols.shape[0] or thing >= automaton.symbols.shape[1]:
+    if state < 0 or event >= symbols.shape[0] or thing >= symbols.shape[1]:
         return DEAD
-    symbol = automaton.symbols[event, thing, bits]
+    symbol = symbols[event, thing, bits]
     if symbol < 0:
         return DEAD
-    return np.int32(automaton.transitions[state, symbol])
+    return np.int32(transitions[state, symbol])
 
 
 @kernel
@@ -120,12 +122,12 @@ def fold_paths(
             known_start, known_count, known = start, np.int64(0), automaton.start
         while known_count < whole:
             row = start + known_count
-            known = read(automaton, known, camera.event[row], camera.object[row], camera.bits[row])
+            known = read(automaton.symbols, automaton.transitions, known, camera.event[row], camera.object[row], camera.bits[row])
             known_count += 1
         state = known
         if whole < count:
             row = start + whole
-            state = read(automaton, state, last, camera.object[row], camera.bits[row])
+            state = read(automaton.symbols, automaton.transitions, state, last, camera.object[row], camera.bits[row])
 
         # ---- light vertices, nearest to the camera first ----
         start, count, last = suffixes.start[i], np.int64(suffixes.length[i]), suffixes.last[i]
@@ -133,10 +135,10 @@ def fold_paths(
             row = start + count - 1
             if start < 0 or row >= len(light.event):
                 continue
-            state = read(automaton, state, last, light.object[row], (light.bits[row] & joint_mask) | joint_bits[i])
+            state = read(automaton.symbols, automaton.transitions, state, last, light.object[row], (light.bits[row] & joint_mask) | joint_bits[i])
             while row > start:
                 row -= 1
-                state = read(automaton, state, light.event[row], light.object[row], light.bits[row])
+                state = read(automaton.symbols, automaton.transitions, state, light.event[row], light.object[row], light.bits[row])
 
         # ---- the emitter ----
         if state >= 0:

@@ -10,7 +10,7 @@ import pytest
 from tiny_job import write_job
 from typer.testing import CliRunner
 
-from pipeline.bench import contenders, main, questions
+from pipeline.bench import contenders, main, pictures, questions
 from pipeline.bench.config import load_benchmark
 from pipeline.bench.contenders import Contenders, NotAvailable
 from pipeline.bench.diffuse_alone import REPLACED
@@ -243,6 +243,17 @@ def test_questions_are_asked_of_a_recorded_run(tmp_path: pathlib.Path, monkeypat
     assert figures["answers"]["ranking"]["answer"] > 2
     assert set(figures["peak_bytes"]) == {"direct", "around", "ranking"}
     assert (tmp_path / "out" / "questions.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_paths_are_bundled_and_drawn_beside_their_peers(tmp_path: pathlib.Path) -> None:
+    more = "sections: [pictures]\ncontenders: []\npictures: {paths: 400, points: 8, size: [96, 72], most_drawing_seconds: 1.0e-9}\n"
+    assert main(write_benchmark(tmp_path, more), tmp_path / "out", ["rounds=1"]) == 0
+    found = json.loads((tmp_path / "out" / "results.json").read_text())
+    assert [row["passed"] for row in found["rows"]] == [True, False]
+    figures = found["sections"]["pictures"]
+    assert set(figures["wall_seconds"]) == {pictures.BUNDLE, pictures.PYTHON, pictures.DRAW, pictures.STRAIGHT}
+    assert figures["paths"] == 400
+    assert figures["segments"] > figures["paths"]
 
 
 def test_a_regular_expression_that_asks_something_else_is_refused(tmp_path: pathlib.Path) -> None:

@@ -2,6 +2,8 @@
 
 import json
 import pathlib
+import shlex
+import shutil
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from pipeline.job_file import checked_view
 from pipeline.stages import run_job
 from queries import open_run
 
+PAGE = pathlib.Path(__file__).parents[2] / "docs/pictures.md"
 SIZE = [160, 120]
 BUNDLES = {"bundles": {"expression": "C D L", "most": 50}, "size": SIZE}
 IRRADIANCE = {"irradiance": {}, "size": SIZE}
@@ -58,8 +61,6 @@ def test_inspection_is_a_run_of_light_walks_beside_the_run(drawn: pathlib.Path, 
 
 
 def test_resume_draws_what_changed_alone(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:
-    import shutil
-
     run = tmp_path / "run"
     shutil.copytree(drawn, run)
     before = {file: file.stat().st_mtime_ns for file in (run / "views").iterdir()}
@@ -162,8 +163,6 @@ def test_report_is_a_stage_and_a_command(drawn: pathlib.Path, tmp_path: pathlib.
     assert result.stdout.strip().splitlines()[-1] == str(page)
     assert "tiny" in page.read_text()
 
-    import shutil
-
     shutil.copytree(drawn, tmp_path / "run")
     job = write_job(tmp_path, **INSPECTED, report={"top": 0, "paths": 0})
     result = pathspace("run", job, "--out", tmp_path / "run", "--resume")
@@ -180,3 +179,24 @@ def test_views_of_the_schema_survive_the_manifest(drawn: pathlib.Path) -> None:
 def test_checked_view_names_the_place() -> None:
     with pytest.raises(JobError, match="did you mean `azimuth`"):
         checked_view("a", {"bundles": {}}, ["camera.orbit.azimut=3"])
+
+
+def test_commands_of_the_page_are_good() -> None:
+    """Every `pathspace view` on the page about pictures names a tool and keys that exist."""
+    lines = [line for line in PAGE.read_text().splitlines() if line.startswith("pathspace view RUN bundles")]
+    assert len(lines) >= 3
+    for line in lines:
+        words = shlex.split(line, comments=True)
+        given = {words[i + 1] for i, word in enumerate(words) if word == "--set"}
+        assert checked_view(words[3], {words[3]: {}}, sorted(given)).tool_name == "bundles"
+
+
+def test_example_of_the_page_draws(
+    drawn: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    code = PAGE.read_text().split("```python\n")[1].split("```")[0]
+    changed = code.replace("runs/spheres", str(drawn)).replace(', region="focus"', "").replace("C D S+ L", "C D L").replace("(640, 480)", "(96, 72)")
+    monkeypatch.chdir(tmp_path)
+    exec(changed, {})
+    assert "light paths" in capsys.readouterr().out
+    assert (tmp_path / "pictures/caustics.png").exists()
