@@ -6,10 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 from pipeline.config import Images
+from pipeline.estimate import SizeEstimate, estimate_size
 from pipeline.identity import differences, fingerprint
 from pipeline.prepare import PreparedJob
 from pipeline.run_folder import RunFolder
 from queries.inspection import FOLDER
+from renderer.trace import Tracer
 
 
 def inspection_folder(folder: RunFolder) -> RunFolder:
@@ -28,6 +30,15 @@ def inspection_job(prepared: PreparedJob) -> PreparedJob | None:
     render = job.render.model_copy(update={"method": "light", "samples": asked.samples})
     loaded = replace(prepared.loaded, job=job.model_copy(update={**bare, "render": render}))
     return PreparedJob(loaded, prepared.scene, settings, fingerprint(settings, prepared.scene))
+
+
+def size_with_inspection(prepared: PreparedJob, tracer: Tracer) -> SizeEstimate:
+    """How large the run will be, the pass included. ``tracer``: of the run itself."""
+    size, job = estimate_size(tracer, prepared.settings), inspection_job(prepared)
+    if job is None:
+        return size
+    light = estimate_size(Tracer(job.scene, job.settings), job.settings)
+    return SizeEstimate({**size.tables, FOLDER: light.bytes}, size.film)
 
 
 def trace_inspection(prepared: PreparedJob, folder: RunFolder, run: Callable[[PreparedJob, RunFolder], None]) -> bool:

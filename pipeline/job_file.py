@@ -252,8 +252,7 @@ def _explained(error: ValidationError, data: Any, place: Any) -> JobError:
         if item["type"] == "extra_forbidden":
             text = f"unknown key `{name}`{_nearest(str(location[-1]), _known_keys(location[:-1]))}"
         elif item["type"] == "missing":
-            known = Job.model_fields.get(str(location[0])) if len(location) == 1 else None
-            text = f"`{name}` is missing: expected {known.description if known else 'one value more'}"
+            text = f"`{name}` is missing: {_meaning(location) or 'expected one value more'}"
         else:
             text = f"`{name}`: {_expectation(item)}, found {_shown(found)}"
         lines[location] = f"{lines[location]}; or {text.split(': ', 1)[1]}" if location in lines else text
@@ -330,11 +329,23 @@ def _shown(value: Any) -> str:
 
 def _known_keys(section: Location) -> list[str]:
     """Keys of the section at ``section``, as the schema knows them."""
+    model = _model(section)
+    return list(model.model_fields) if model else []
+
+
+def _meaning(location: Location) -> str | None:
+    """What the schema says of a key; None where it knows none."""
+    model = _model(location[:-1])
+    field = model.model_fields.get(str(location[-1])) if model else None
+    return field.description if field else None
+
+
+def _model(section: Location) -> type[BaseModel] | None:
+    """The schema of the section at ``section``."""
     annotation: Any = Job
     for step in section:
         annotation = _inside(annotation, step)
-    models = [kind for kind in _types(annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)]
-    return list(models[0].model_fields) if models else []
+    return next((kind for kind in _types(annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
 
 
 def _inside(annotation: Any, step: str | int) -> Any:

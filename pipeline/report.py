@@ -9,6 +9,7 @@ from pipeline.config import Report
 from pipeline.deeper import cut
 from pipeline.diagnose import ALL
 from pipeline.errors import JobError
+from pipeline.files import clear_errors
 from pipeline.run_folder import RunFolder
 from queries.errors import QueryError
 from queries.run import Run, open_run
@@ -53,4 +54,5 @@ def print_report(path: pathlib.Path, out: pathlib.Path | None, given: Mapping[st
     folder = RunFolder(path)
     with open_run(path) as run:
         described = (run.manifest.get("job") or {}).get("report") or {}
-    print(write_job_report(folder, Report.model_validate({**described, **given}), None, out))
+    with clear_errors("writing the report", out or folder.report.parent):
+        print(write_job_report(folder, Report.model_validate({**described, **given}), None, out))

@@ -13,11 +13,11 @@ from typing import Any
 
 from pipeline import catalogues, film_sum, images
 from pipeline.errors import JobError, RunFolderError
-from pipeline.estimate import SizeEstimate, estimate_size, refuse_too_large, refuse_too_much_memory
+from pipeline.estimate import SizeEstimate, refuse_too_large, refuse_too_much_memory
 from pipeline.executor import render_shards
 from pipeline.files import FileRecord, checksum, clear_errors, is_whole
 from pipeline.identity import camera, differences, processor, renderer_version, settings_as_json, versions
-from pipeline.inspection import trace_inspection
+from pipeline.inspection import size_with_inspection, trace_inspection
 from pipeline.prepare import PreparedJob, prepare_job
 from pipeline.progress import LOG, log_file, progress
 from pipeline.questions import region_terms
@@ -57,7 +57,7 @@ def validate_job(path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib
     """Check a job as ``run`` would, and estimate its size; nothing is written. Raises JobError and SceneError."""
     prepared = prepare_job(path, overrides)
     refuse_too_much_memory(prepared.settings, cores())
-    size = estimate_size(Tracer(prepared.scene, prepared.settings), prepared.settings)
+    size = size_with_inspection(prepared, Tracer(prepared.scene, prepared.settings))
     refuse_too_large(size, RunFolder(prepared.loaded.run_folder(out)))
     return prepared, size
 
@@ -183,7 +183,7 @@ class Run:
         """Estimate the size of the run, and refuse it before anything is written if it cannot fit."""
         tracer = self.tracer
         with self.watch.stage("estimate"):
-            size = estimate_size(tracer, self.settings)
+            size = size_with_inspection(self.prepared, tracer)
             LOG.info("%d walks, about %s", self.settings.walks, size.text())
             refuse_too_large(size, self.folder)
 

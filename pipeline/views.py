@@ -7,7 +7,7 @@ from typing import Any
 
 from pipeline.config import Job
 from pipeline.errors import JobError
-from pipeline.files import FileRecord, checksum, is_whole
+from pipeline.files import FileRecord, checksum, clear_errors, is_whole
 from pipeline.job_file import checked_view
 from pipeline.progress import Progress
 from pipeline.run_folder import RunFolder
@@ -83,7 +83,8 @@ def print_view(
         target = out or pathlib.Path(f"{what}.png")
         if target.suffix != ".png":
             raise JobError(f"expected a picture to write, such as {what}.png, found --out {target}")
-        drawn = draw_view(run, view, target.parent, target.stem)
+        with clear_errors("drawing a view", target.parent):
+            drawn = draw_view(run, view, target.parent, target.stem)
     print(drawn.caption)
     for name, value in drawn.figures.items():
         print(f"  {name.replace('_', ' ')}: {value:.6g}" if isinstance(value, float) else f"  {name.replace('_', ' ')}: {value}")

@@ -228,6 +228,7 @@ questions:
 """
 
 
+@pytest.mark.slow
 def test_questions_are_asked_of_a_recorded_run(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(questions, "AGAIN", ("mitsuba_scalar",))
     path = write_benchmark(tmp_path, QUESTIONS)
@@ -245,6 +246,7 @@ def test_questions_are_asked_of_a_recorded_run(tmp_path: pathlib.Path, monkeypat
     assert (tmp_path / "out" / "questions.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_paths_are_bundled_and_drawn_beside_their_peers(tmp_path: pathlib.Path) -> None:
     more = "sections: [pictures]\ncontenders: []\npictures: {paths: 400, points: 8, size: [96, 72], most_drawing_seconds: 1.0e-9}\n"
     assert main(write_benchmark(tmp_path, more), tmp_path / "out", ["rounds=1"]) == 0
@@ -256,6 +258,7 @@ def test_paths_are_bundled_and_drawn_beside_their_peers(tmp_path: pathlib.Path) 
     assert figures["segments"] > figures["paths"]
 
 
+@pytest.mark.slow
 def test_a_regular_expression_that_asks_something_else_is_refused(tmp_path: pathlib.Path) -> None:
     path = write_benchmark(tmp_path, QUESTIONS.replace("C.D(..)*L", "C.D(..)+L"))
     with pytest.raises(JobError, match="not the same question"):

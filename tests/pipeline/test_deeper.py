@@ -130,6 +130,7 @@ def test_the_estimate_agrees_with_a_deeper_render(folder: pathlib.Path, tmp_path
     assert LIMIT < line["deepest"] <= deep
 
 
+@pytest.mark.slow
 def test_standard_errors_cover_the_truth(tmp_path: pathlib.Path) -> None:
     """Over many small runs, the estimates scatter as their errors say."""
     estimates, errors = [], []

@@ -15,7 +15,7 @@ from pipeline.cli import app
 from pipeline.config import Job
 from pipeline.errors import JobError
 from pipeline.job_file import checked_view
-from pipeline.stages import run_job
+from pipeline.stages import run_job, validate_job
 from queries import open_run
 
 PAGE = pathlib.Path(__file__).parents[2] / "docs/pictures.md"
@@ -58,6 +58,14 @@ def test_inspection_is_a_run_of_light_walks_beside_the_run(drawn: pathlib.Path, 
         assert light.settings["passes"] == 2
         assert light.tables["light_vertices"].num_rows > 2 * 64 * 64
     assert manifest(drawn / "inspection")["views"] == {}
+
+
+def test_the_estimate_counts_the_pass(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    _, plain = validate_job(write_job(tmp_path))
+    _, inspected = validate_job(write_job(tmp_path, **INSPECTED))
+    written = sum(file.stat().st_size for file in (drawn / "inspection/tables").rglob("*.arrow"))
+    assert inspected.bytes - plain.bytes == pytest.approx(written, rel=0.15, abs=2e6)  # its films, too, until they are summed
+    assert "inspection" in inspected.text()
 
 
 def test_resume_draws_what_changed_alone(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:
@@ -137,6 +145,7 @@ def test_what_can_be_drawn_is_listed(drawn: pathlib.Path) -> None:
         (["bundles", "--expression", "nothruput; C D L"], "nothruput"),
         (["bundles", "--region", "nowhere"], "nowhere"),
         (["bundles", "--out", "a.jpg"], "such as bundles.png"),
+        (["probe"], "`views.probe.probe.probes` is missing: "),
         (["irradiance", "--set", "look.scene=glass"], "translucent"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -148,6 +157,16 @@ def test_bad_views_give_one_clear_message(drawn: pathlib.Path, arguments: list[s
     assert says in result.stderr
     assert "Traceback" not in result.output
     assert not (tmp_path / "a.png").exists()
+
+
+def test_places_that_cannot_be_written_are_named(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    (tmp_path / "file").write_text("")
+    for command in (("view", drawn, "direct", "--out", tmp_path / "file/a.png"), ("report", drawn, "--out", tmp_path / "file/report", "--paths", 0)):
+        result = pathspace(*command)
+        assert result.exit_code != 0
+        assert "Traceback" not in result.output
+        assert "fault of pathspace" not in result.stderr
+        assert str(tmp_path / "file") in result.stderr
 
 
 def test_a_run_without_light_walks_says_what_to_do(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:

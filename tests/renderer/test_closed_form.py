@@ -36,6 +36,7 @@ def test_closed_room(type: str, method: str) -> None:
     assert_expected(blocks(found, 4), LE / (1 - KD), tests=4)
 
 
+@pytest.mark.slow
 def test_closed_room_without_roulette() -> None:
     found = images(room("sphere"), 8, rr_depth=1000)
     assert_expected(blocks(found, 4), LE / (1 - KD))
