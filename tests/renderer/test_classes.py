@@ -49,8 +49,8 @@ def test_path_and_light_tracer_agree_class_by_class() -> None:
     assert p[worst] > sidak(3 * len(p)), f"{worst}: p = {p[worst]:.1e}, path over light {ratio}; of {len(p)} classes"
 
 
-@pytest.mark.parametrize("method", ["path", "light"])
-@pytest.mark.parametrize(("type", "glossy"), [("plastic", "RS"), ("roughplastic", "RG")])
+@pytest.mark.parametrize("method", ["path", pytest.param("light", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("type", "glossy"), [("plastic", "RS"), pytest.param("roughplastic", "RG", marks=pytest.mark.slow)])
 def test_lobe_by_lobe(type: str, glossy: str, method: str) -> None:
     """The rows whose events are all of one lobe have the energy of a render in which the other lobe is black."""
     whole = with_all_features(load_scene(coated_scene(type)))

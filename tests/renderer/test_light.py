@@ -63,7 +63,10 @@ def images(description: Dict, samples: int, method: str, **changes: Any) -> F64:
     return replicate_images(loaded, settings_of(loaded, samples * REPLICATES, method, **changes), REPLICATES)
 
 
-@pytest.mark.parametrize("name", SCENES)
+LONG = ("thin_lens", "through_rough_glass")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SCENES])
 def test_same_image(name: str, tmp_path: Folder) -> None:
     description = SCENES[name](tmp_path)
     assert_same_image(images(description, 192, "light"), images(description, 32, "path"), tmp_path, TESTS, bias=0.03)
