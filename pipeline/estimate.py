@@ -10,6 +10,7 @@ import pyarrow as pa
 from pipeline.errors import JobError
 from pipeline.run_folder import RunFolder
 from pipeline.shards import shard_count, shard_size
+from queries.inspection import FOLDER
 from renderer.settings import TraceSettings
 from renderer.trace import Tracer
 
@@ -67,7 +68,8 @@ def refuse_too_large(size: SizeEstimate, folder: RunFolder) -> None:
     if size.bytes > free:
         raise JobError(
             f"the run needs about {size.text()}, and {human_bytes(free)} are free at `{folder.path}`: "
-            "lower render.samples or render.resolution, set record.keep to `none` or a fraction, or choose another disk with --out"
+            f"lower {'inspection.samples, ' if FOLDER in size.tables else ''}render.samples or render.resolution, "
+            "set record.keep to `none` or a fraction, or choose another disk with --out"
         )
 
 

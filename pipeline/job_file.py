@@ -256,7 +256,8 @@ def _explained(error: ValidationError, data: Any, place: Any) -> JobError:
         else:
             text = f"`{name}`: {_expectation(item)}, found {_shown(found)}"
         lines[location] = f"{lines[location]}; or {text.split(': ', 1)[1]}" if location in lines else text
-    first, *rest = lines
+    # What a key could be instead says less than what is wrong inside of it.
+    first, *rest = [outer for outer in lines if not any(outer == inner[: len(outer)] for inner in lines if len(inner) > len(outer))]
     message = lines[first] + "".join(f"\n{place(location)}: {lines[location]}" for location in rest)
     return JobError(message, place(first))
 
@@ -298,6 +299,7 @@ _EXPECTATIONS = {
     "less_than_equal": "expected at most {le}",
     "less_than": "expected less than {lt}",
     "too_long": "expected at most {max_length} values",
+    "too_short": "expected at least {min_length} values",
     "tuple_type": "expected a list of two whole numbers",
     "dict_type": "expected a section of keys and values",
     "model_type": "expected a section of keys and values",

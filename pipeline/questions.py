@@ -1,6 +1,7 @@
 """What a job will ask of its run, checked before hours of rendering: regions, expressions, rankings, views."""
 
-from collections.abc import Collection
+import itertools
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING, Any
 
 from pipeline.config import Rank
@@ -10,6 +11,7 @@ from pipeline.job_file import LoadedJob
 from pipeline.progress import LOG
 from renderer.scene.arrays import Scene
 from viz.cameras import JOB_CAMERA
+from viz.tools.arrows import Arrows
 from viz.tools.base import WalkTool
 
 if TYPE_CHECKING:
@@ -64,13 +66,11 @@ def _check_regions(loaded: LoadedJob, scene: Scene | None) -> None:
     from queries.errors import QueryError
     from queries.regions import region
 
-    objects = [thing.name for thing in scene.objects] if scene else []
     for name, description in loaded.job.regions.items():
         place = loaded.region_places[name]
-        if scene and description.object is not None and description.object.name not in objects:
-            raise JobError(f"`regions.{name}`: the scene has no object `{description.object.name}` (it has {', '.join(objects)})", place)
-        if scene:
-            continue  # read before the scene was
+        if scene:  # files were read before the scene was
+            _check_objects(scene, [description.object.name] if description.object else [], f"regions.{name}", place)
+            continue
         try:
             region(description, loaded.folder).check()
         except QueryError as error:
@@ -88,7 +88,7 @@ def _check_expressions(loaded: LoadedJob, scene: Scene | None) -> None:
 
 
 def _check_views(loaded: LoadedJob, scene: Scene | None) -> None:
-    """Every view's expression compiles, its region, camera and light walks exist."""
+    """Every view's expression compiles, its region, camera, objects and light walks exist."""
     job = loaded.job
     for name, view in job.views.items():
         place, tool = loaded.view_places[name], view.tool
@@ -101,8 +101,20 @@ def _check_views(loaded: LoadedJob, scene: Scene | None) -> None:
             raise JobError(f"`{key}.region`: there is no region `{tool.region}` ({_known(job.regions, 'regions')})", place)
         if isinstance(view.camera, str) and view.camera not in (JOB_CAMERA, *job.cameras):
             raise JobError(f"`views.{name}.camera`: there is no camera `{view.camera}` ({_known(job.cameras, 'cameras')})", place)
+        if scene:
+            _check_objects(scene, view.look.hide, f"views.{name}.look.hide", place)
+        if scene and isinstance(tool, Arrows):
+            _check_objects(scene, itertools.chain.from_iterable(tool.groups.values()), f"{key}.groups", place)
         if scene and isinstance(tool, WalkTool):
             _check_walks(loaded, tool, scene, key, place)
+
+
+def _check_objects(scene: Scene, names: Iterable[str], key: str, place: str) -> None:
+    """The scene has all objects of these names."""
+    objects = [thing.name for thing in scene.objects]
+    for name in names:
+        if name not in objects:
+            raise JobError(f"`{key}`: the scene has no object `{name}` (it has {', '.join(objects)})", place)
 
 
 def _check_walks(loaded: LoadedJob, tool: WalkTool, scene: Scene, key: str, place: str) -> None:

@@ -111,11 +111,11 @@ def letter_height(width: int) -> int:
 
 
 def wrapped(text: str, width: int, font: Any) -> list[str]:
-    """Text as lines that are no wider than ``width`` pixels; words that are wider are cut."""
+    """Text as lines that are no wider than ``width`` pixels; words that are wider are cut. A percent sign stays with its number."""
     lines: list[str] = []
     for paragraph in text.splitlines():
         line = ""
-        for word in paragraph.split():
+        for word in filter(None, paragraph.replace(" %", "\N{NO-BREAK SPACE}%").split(" ")):
             longer = f"{line} {word}" if line else word
             if _width(longer, font) <= width:
                 line = longer

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.run import Run
-from viz.cameras import CameraDescription, Pose, poses
+from viz.cameras import MOST_FRAMES, CameraDescription, Pose, poses
 from viz.description import View
 from viz.exports import write_gltf, write_vtp
 from viz.pictures import finished, message_picture, write_animation, write_png
@@ -87,8 +87,9 @@ def _write_sequence(
 ) -> tuple[pathlib.Path, ...]:
     """Write every picture as a PNG of its own, the middle one once more as the view's picture, and all of them as an animation."""
     folder.mkdir(exist_ok=True)
-    for old in folder.glob("[0-9]*.png"):
-        old.unlink()
+    for old in folder.glob("[0-9][0-9][0-9][0-9].png"):  # of a longer sequence; whatever else lies there is someone's
+        if int(old.stem) < MOST_FRAMES:
+            old.unlink()
     frames = tuple(folder / f"{i:04d}.png" for i in range(count))
 
     def written() -> Iterator[U8]:

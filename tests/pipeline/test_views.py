@@ -4,6 +4,7 @@ import json
 import pathlib
 import shlex
 import shutil
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,6 +101,28 @@ def test_orbit_is_a_sequence(drawn: pathlib.Path, tmp_path: pathlib.Path) -> Non
     assert np.array_equal(np.asarray(Image.open(tmp_path / "around.png")), pictures[1])
     animation = Image.open(tmp_path / "around.gif")
     assert animation.n_frames == 3
+
+
+def test_a_sequence_replaces_its_own_pictures_alone(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    folder = tmp_path / "around"
+    folder.mkdir()
+    for name in ("0007.png", "7.png", "20261122.png", "9999.png", "0007-notes.png"):
+        (folder / name).write_text("")
+    result = pathspace("view", drawn, "direct", "--set", "camera={orbit: {frames: 2}}", "--set", "size=[96, 72]", "--out", tmp_path / "around.png")
+    assert result.exit_code == 0, result.output
+    assert {file.name for file in folder.iterdir()} == {"0000.png", "0001.png", "7.png", "20261122.png", "9999.png", "0007-notes.png"}
+
+
+@pytest.mark.parametrize(
+    ("view", "key"),
+    [
+        ({"bundles": {}, "look": {"hide": ["nobody"]}}, "look.hide"),
+        ({"arrows": {"probes": [{"position": [0, 0, 0]}], "groups": {"lamp": ["nobody"]}}}, "arrows.groups"),
+    ],
+)
+def test_objects_that_the_scene_lacks_are_told_before_rendering(view: dict[str, Any], key: str, tmp_path: pathlib.Path) -> None:
+    with pytest.raises(JobError, match=rf"`views.a.{key}`: the scene has no object `nobody` \(it has "):
+        validate_job(write_job(tmp_path, inspection={"samples": 1}, views={"a": view}))
 
 
 def test_same_view_gives_the_same_pixels(drawn: pathlib.Path, tmp_path: pathlib.Path) -> None:

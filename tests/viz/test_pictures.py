@@ -4,11 +4,11 @@ import pathlib
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageFont
 
 from viz.colors import color_map
 from viz.numbers import number
-from viz.pictures import finished, message_picture, write_animation, write_png
+from viz.pictures import finished, message_picture, wrapped, write_animation, write_png
 from viz.ticks import ticks
 from viz.tools.base import ColorBar, Drawn
 
@@ -53,6 +53,14 @@ def test_the_color_bar_has_all_its_colors_in_order() -> None:
 def changes(colors: np.ndarray) -> np.ndarray:
     """Colors without those that are the same as the one before."""
     return colors[np.r_[True, (colors[1:] != colors[:-1]).any(axis=1)]]
+
+
+def test_a_percent_sign_stays_with_its_number() -> None:
+    font = ImageFont.load_default(12)
+    for width in range(60, 200, 7):
+        lines = wrapped("known to 93 %  of it, 7 % of which", width, font)
+        assert not any(line.startswith("%") for line in lines)
+        assert " ".join(lines).replace("\N{NO-BREAK SPACE}", " ") == "known to 93 % of it, 7 % of which"
 
 
 def test_an_empty_strip_is_none() -> None:

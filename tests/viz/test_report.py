@@ -295,6 +295,8 @@ def test_numbers_for_people() -> None:
     ]
     assert with_error(1.23456e-5, 1.2e-7) == "(1.235 ± 0.012) × 10⁻⁵"
     assert with_error(123456.0, 1200.0) == "123,456 ± 1,200"
+    assert with_error(2.4677e10, 1.6957e10) == "(2.5 ± 1.7) × 10¹⁰"
+    assert with_error(0.5, 2e6) == "(0.0 ± 2.0) × 10⁶"
     assert [percent(x) for x in (None, 0.0, 1.0, 0.999, 0.00312)] == ["–", "0.00 %", "100 %", "99.9 %", "0.312 %"]
     assert slug("../../etc/<x> Y") == "etc-x-y"
     assert len(set(class_colors(60))) == 60

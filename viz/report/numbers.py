@@ -9,7 +9,7 @@ UNKNOWN = "–"
 
 
 def number(value: Any, digits: int = 4) -> str:
-    """A number with so many digits; integers in full, with groups of three; unknown ones as a dash.
+    """A number with so many digits, or the whole part of one below a million; integers in full, with groups of three; unknown ones as a dash.
 
     >>> number(1234567), number(0.000123456), number(0.5), number(None)
     ('1,234,567', '1.235 × 10⁻⁴', '0.5', '–')
@@ -23,10 +23,8 @@ def number(value: Any, digits: int = 4) -> str:
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     text = f"{value:.{digits}g}"
-    if "e" in text:
+    if "e" in text and not 1_000 <= abs(value) < 1e6:
         mantissa, exponent = text.split("e")
-        if 0 < int(exponent) < 12:
-            return f"{value:,.0f}".replace("-", "−")
         return f"{mantissa} × {power_of_ten(int(exponent))}".replace("-", "−")
     if abs(value) >= 1_000:
         return f"{value:,.0f}".replace("-", "−")
@@ -39,14 +37,15 @@ def number(value: Any, digits: int = 4) -> str:
 def with_error(value: Any, error: Any) -> str:
     """A value and its standard error, both to the error's second digit.
 
-    >>> with_error(0.274512, 0.00123), with_error(12.0, None)
-    ('0.2745 ± 0.0012', '12')
+    >>> with_error(0.274512, 0.00123), with_error(12.0, None), with_error(2.4677e10, 1.6957e10)
+    ('0.2745 ± 0.0012', '12', '(2.5 ± 1.7) × 10¹⁰')
     """
     if value is None or error is None or not math.isfinite(value) or not math.isfinite(error) or error <= 0:
         return number(value)
     places = 1 - math.floor(math.log10(error))
-    if 0 < abs(value) < 1e-3:
-        power = math.floor(math.log10(abs(value)))
+    large = max(abs(value), error) >= 1e6
+    if large or 0 < abs(value) < 1e-3:
+        power = math.floor(math.log10(max(abs(value), error) if large else abs(value)))
         scale = 10.0**power
         shown = max(0, places + power)
         return f"({value / scale:.{shown}f} ± {error / scale:.{shown}f}) × {power_of_ten(power)}".replace("-", "−")

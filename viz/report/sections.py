@@ -20,7 +20,7 @@ from viz.report.tables import Cell, Column, Table, answer_table, heading, short_
 DrawClass = Callable[[str, str], Picture | None]  # a name, and the expression that selects what is to be drawn
 TOP_CLASSES = 30  # rows that are shown before a reader asks for more
 MOST_CLASSES = 200
-MOST_ROWS, FIRST_ROWS = 40, 12  # of diagnostics: at all, and before a reader asks for more
+MOST_ROWS, FIRST_ROWS = 40, 12  # of diagnostics, at all; of these and of rankings, before a reader asks for more
 
 _RANKING_MEANINGS = {
     "rank": "the place in this order",
@@ -124,7 +124,7 @@ def rankings(run: Run, draw: DrawClass | None, top: int) -> list[Ranking]:
         asked = known.get("asked") or {}
         shown = answer.select([column for column in answer.schema.names if column not in _LEFT_OUT])
         title = f"{name}: {_asked(asked)}"
-        table = answer_table(f"Ranking {title}", shown, explained=_RANKING_MEANINGS)
+        table = answer_table(f"Ranking {title}", shown, cut=FIRST_ROWS, explained=_RANKING_MEANINGS)
         found.append(Ranking(name, title, table, _drawn(name, answer, draw, top)))
     return found
 
