@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from queries.regions import RegionDescription, RegionName
+from queries.subpixel.description import LayoutName, SubpixelDescription
 from renderer.scene.sensors import LARGEST_FILM
 from renderer.settings import UNBOUNDED_DEPTH
 from viz.cameras import JOB_CAMERA, CameraDescription
@@ -60,6 +61,16 @@ class Render(Section):
     )
     filter: Literal["box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"] | None = Field(
         default=None, description="Reconstruction filter of the film."
+    )
+    texture_filter: Literal["point", "ewa"] = Field(
+        default="point",
+        description="How bitmaps are read where the camera sees them: at a `point`, or averaged over the pixel's footprint (`ewa`, elliptical "
+        "weighted average). `ewa` needs `filter: box`.",
+    )
+    texture_layout: LayoutName | None = Field(
+        default=None,
+        description="With `ewa`: fold the subpixel filter of this display into the footprint, so that the image's R, G and B are the drive of the "
+        "subpixels. The display has one R, G and B in each pixel, as `rgb_stripe` and `bgr_stripe` have.",
     )
 
     @field_validator("max_depth")
@@ -132,6 +143,12 @@ class Report(Section):
     paths: int = Field(default=600, ge=0, le=20_000, description="Paths in the three-dimensional view that a person can turn; 0 leaves it out.")
 
 
+class Analysis(Section):
+    """What is computed from the tables after rendering, beside images and rankings."""
+
+    subpixel: SubpixelDescription | None = Field(default=None, description="Subpixel filters for displays. Default: none.")
+
+
 class Images(Section):
     """How the pictures beside the linear images are made."""
 
@@ -155,6 +172,7 @@ class Job(Section):
     cameras: dict[Name, CameraDescription] = Field(default={}, description="Named cameras for `views`.")
     views: dict[Name, View] = Field(default={}, description="Pictures of what light does: name -> what is drawn, and how it is shown.")
     inspection: Inspection | None = Field(default=None, description="Light walks for the tools that measure light. Default: none are traced.")
+    analysis: Analysis = Field(default=Analysis(), description="Further analysis of the run.")
     report: Report | None = Field(default=None, description="The offline report. Default: none is written; `report: {}` writes one.")
     images: Images = Field(default=Images(), description="How pictures are made.")
     out: str | None = Field(default=None, min_length=1, description="The run folder. Default: `runs/<name>` in the folder where the command is run.")

@@ -8,10 +8,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from pipeline.config import Job, Render
-from pipeline.job_file import inner_types
+from pipeline.schema import inner_types
 from viz.tools.base import Tool
 
 _TOOL = "views.NAME.TOOL"
+_NOT_OF_A_SCENE = ("texture_layout",)  # keys of `render` that a scene says nothing about
 _EXAMPLE = """\
 name: cornell
 scene: scenes/cornell.yaml          # or a Mitsuba 3 .xml
@@ -103,7 +104,7 @@ def _default(model: type[BaseModel], name: str) -> str:
     if model is Job and name == "out":
         return "`runs/<name>`"
     if field.default is None:
-        return "the scene's" if model is Render else "none"
+        return "the scene's" if model is Render and name not in _NOT_OF_A_SCENE else "none"
     return f"`{json.dumps(field.default)}`"
 
 

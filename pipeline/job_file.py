@@ -1,25 +1,26 @@
 """From a YAML file to a checked job: every complaint names the file, the line, and the nearest key that exists."""
 
-import difflib
 import pathlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from pipeline.config import Job, Name
+from pipeline.complaints import explained
+from pipeline.config import Analysis, Job, Name
 from pipeline.errors import JobError
+from pipeline.schema import Location
+from queries.subpixel.description import SubpixelDescription
 from viz.description import View
 
 MAX_BYTES = 16 << 20
 MAX_NODES = 200_000
 MAX_NESTING = 64
 
-Location = tuple[str | int, ...]
+Part = TypeVar("Part", bound=BaseModel)
 
 
 class _Loader(yaml.SafeLoader):
@@ -83,7 +84,7 @@ def load_job(path: pathlib.Path, settings: Sequence[str] = ()) -> LoadedJob:
     try:
         job = Job.model_validate(data)
     except ValidationError as error:
-        raise _explained(error, data, place) from None
+        raise explained(error, data, place) from None
     sections = ("aovs", "regions", "rank", "views")
     aovs, regions, rank, views = ({name: place((section, name)) for name in getattr(job, section)} for section in sections)
     loaded = LoadedJob(job, path, place(("scene",)), aovs, regions, rank, views, tuple(settings))
@@ -98,15 +99,32 @@ class _Views(BaseModel):
     views: dict[Name, View]
 
 
+class _Analysis(BaseModel):
+    """The analysis of a job alone."""
+
+    analysis: Analysis
+
+
 def checked_view(name: str, given: dict[str, Any], settings: Sequence[str] = ()) -> View:
     """A view that is described outside of a job, with ``key=value`` settings of its own keys. Raises JobError."""
-    data: dict[Any, Any] = {"views": {name: dict(given)}}
+    return _checked(_Views, {"views": {name: dict(given)}}, f"views.{name}", settings, f"view {name}").views[name]
+
+
+def checked_subpixel(given: dict[str, Any], settings: Sequence[str] = ()) -> SubpixelDescription:
+    """An analysis of subpixel filters that is described outside of a job, likewise. Raises JobError."""
+    found = _checked(_Analysis, {"analysis": {"subpixel": dict(given)}}, "analysis.subpixel", settings, "subpixel").analysis.subpixel
+    assert found is not None
+    return found
+
+
+def _checked(model: type[Part], data: dict[Any, Any], prefix: str, settings: Sequence[str], place: str) -> Part:
+    """A part of a job alone, with settings of the keys below ``prefix``; complaints are placed at ``place``."""
     for setting in settings:
-        _apply(data, f"views.{name}.{setting}" if "=" in setting else setting)
+        _apply(data, f"{prefix}.{setting}" if "=" in setting else setting)
     try:
-        return _Views.model_validate(data).views[name]
+        return model.model_validate(data)
     except ValidationError as error:
-        raise _explained(error, data, lambda _: f"view {name}") from None
+        raise explained(error, data, lambda _: place) from None
 
 
 def _read(path: pathlib.Path) -> str:
@@ -237,151 +255,3 @@ def _apply(data: dict[Any, Any], setting: str) -> Location:
 def _wrapped(node: yaml.Node) -> yaml.MappingNode:
     key = yaml.ScalarNode("tag:yaml.org,2002:str", "value", node.start_mark, node.end_mark)
     return yaml.MappingNode("tag:yaml.org,2002:map", [(key, node)], node.start_mark, node.end_mark)
-
-
-# --- complaints ---------------------------------------------------------------------------------------------------
-
-
-def _explained(error: ValidationError, data: Any, place: Any) -> JobError:
-    """One message for all the complaints of the schema; each names its key, what was found and the nearest known key."""
-    lines: dict[Location, str] = {}
-    for item in error.errors(include_url=False):
-        location = _location(item["loc"], data, item["type"] == "missing")
-        found = _value(data, location)
-        name = ".".join(map(str, location)) or "job"
-        if item["type"] == "extra_forbidden":
-            text = f"unknown key `{name}`{_nearest(str(location[-1]), _known_keys(location[:-1]))}"
-        elif item["type"] == "missing":
-            text = f"`{name}` is missing: {_meaning(location) or 'expected one value more'}"
-        else:
-            text = f"`{name}`: {_expectation(item)}, found {_shown(found)}"
-        lines[location] = f"{lines[location]}; or {text.split(': ', 1)[1]}" if location in lines else text
-    # What a key could be instead says less than what is wrong inside of it.
-    first, *rest = [outer for outer in lines if not any(outer == inner[: len(outer)] for inner in lines if len(inner) > len(outer))]
-    message = lines[first] + "".join(f"\n{place(location)}: {lines[location]}" for location in rest)
-    return JobError(message, place(first))
-
-
-def _location(steps: Sequence[str | int], data: Any, missing: bool = False) -> Location:
-    """The part of pydantic's location that names keys of the data (it also names members of unions, and ``[key]``).
-
-    ``missing``: its end is a key that the data lack.
-    """
-    kept: list[str | int] = []
-    for i, step in enumerate(steps):
-        if isinstance(data, dict):
-            if step == "[key]":
-                break
-            if step not in data and not (missing and i == len(steps) - 1):
-                continue
-            kept.append(step)
-            data = data.get(step)
-        elif isinstance(data, (list, tuple)) and isinstance(step, int):
-            kept.append(step)
-            data = data[step] if step < len(data) else None
-    return tuple(kept)
-
-
-def _value(data: Any, location: Location) -> Any:
-    for step in location:
-        if isinstance(data, dict):
-            data = data.get(step)
-        elif isinstance(data, list) and isinstance(step, int) and step < len(data):
-            data = data[step]
-        else:
-            return None
-    return data
-
-
-_EXPECTATIONS = {
-    "string_pattern_mismatch": "expected letters, digits, `_`, `.` and `-`, a letter or digit first",
-    "greater_than_equal": "expected {ge} or more",
-    "less_than_equal": "expected at most {le}",
-    "less_than": "expected less than {lt}",
-    "too_long": "expected at most {max_length} values",
-    "too_short": "expected at least {min_length} values",
-    "tuple_type": "expected a list of two whole numbers",
-    "dict_type": "expected a section of keys and values",
-    "model_type": "expected a section of keys and values",
-    "string_too_short": "expected a text that is not empty",
-    "string_too_long": "expected at most {max_length} characters",
-    "string_type": "expected a text",
-    "int_type": "expected a whole number",
-    "bool_type": "expected true or false",
-    "float_type": "expected a number",
-    "list_type": "expected a list",
-    "invalid_key": "expected keys that are texts",
-}
-
-
-def _expectation(item: Any) -> str:
-    """What the schema expected, in our words where we have them."""
-    if item["type"] in _EXPECTATIONS:
-        return _EXPECTATIONS[item["type"]].format(**item.get("ctx", {}))
-    message = str(item["msg"]).removeprefix("Value error, ").replace("Input should be", "expected")
-    return message[0].lower() + message[1:]
-
-
-def _shown(value: Any) -> str:
-    if value is None:
-        return "nothing"
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:77]}…"
-
-
-def _known_keys(section: Location) -> list[str]:
-    """Keys of the section at ``section``, as the schema knows them."""
-    model = _model(section)
-    return list(model.model_fields) if model else []
-
-
-def _meaning(location: Location) -> str | None:
-    """What the schema says of a key; None where it knows none."""
-    model = _model(location[:-1])
-    field = model.model_fields.get(str(location[-1])) if model else None
-    return field.description if field else None
-
-
-def _model(section: Location) -> type[BaseModel] | None:
-    """The schema of the section at ``section``."""
-    annotation: Any = Job
-    for step in section:
-        annotation = _inside(annotation, step)
-    return next((kind for kind in _types(annotation) if isinstance(kind, type) and issubclass(kind, BaseModel)), None)
-
-
-def _inside(annotation: Any, step: str | int) -> Any:
-    """The type of what a key, a name or a place in a list leads to."""
-    for inner, kind in inner_types(annotation):
-        if inner:
-            return kind
-        if isinstance(kind, type) and issubclass(kind, BaseModel) and step in kind.model_fields:
-            return kind.model_fields[str(step)].annotation
-    return None
-
-
-def inner_types(annotation: Any) -> Iterator[tuple[str, Any]]:
-    """The members of a type, each with the step that leads to it: none, ``.NAME`` for values of a mapping, ``.N`` for those of a list."""
-    for kind in _types(annotation):
-        if get_origin(kind) is dict:
-            yield from ((".NAME", member) for member in _types(get_args(kind)[1]))
-        elif get_origin(kind) in (list, tuple):
-            yield from ((".N", member) for member in _types(get_args(kind)[0]))
-        else:
-            yield "", kind
-
-
-def _types(annotation: Any) -> Iterator[Any]:
-    """The members of a union, or the type itself; what is annotated is taken bare."""
-    if get_origin(annotation) in (Union, UnionType):
-        for member in get_args(annotation):
-            yield from _types(member)
-    elif get_origin(annotation) is Annotated:
-        yield from _types(get_args(annotation)[0])
-    else:
-        yield annotation
-
-
-def _nearest(key: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-    return f": did you mean `{close[0]}`?" if close else f": known keys are {', '.join(f'`{k}`' for k in known)}"

@@ -1,0 +1,138 @@
+"""Optimal subpixel kernels: the least-squares problem of thesis 4.3, solved one residue of frequencies at a time.
+
+The error of a display that shows α instead of the image signal γ is E(k) = s_k m_q(k) α_k - Σ_d m_d γ_{k,d} (Eq. 4.1, with the spacing s_k in the
+place of 3), and its cost is Σ_c Σ_n W_c(f_n) |ê_c(n)|² (Eq. 4.4). A pattern of period P couples only the P frequencies of one residue,
+r + j N/P, so the system of N unknowns falls apart into N/P systems of as many unknowns as a period has subpixels. In two dimensions the same
+holds along both axes. The minimum for an impulse at each position of a period, in each channel of the signal, is a kernel.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from renderer.filters.subpixel.layout import Layout
+from renderer.filters.subpixel.sensitivity import Sensitivity, exponential
+from renderer.filters.subpixel.viewing import Viewing
+
+F64 = npt.NDArray[np.float64]
+C128 = npt.NDArray[np.complex128]
+
+RANK_TOLERANCE = 1e-7  # singular values below this share of a residue's largest are zero: the square root of what A^-1 in float64 can tell apart
+PIXELS_1D, PIXELS_2D = 100, 24  # how many pixels the signal is long, about: 300 positions of an RGB stripe, as in the thesis
+
+
+@dataclass(frozen=True, eq=False)
+class Kernels:
+    """All kernels of a layout: α_i = Σ_d Σ_o h_{p,d}(o) γ_{i+o,d}, where p is the subpixel of ``layout.active`` at position i.
+
+    ``h``: float64 (subpixels, primaries, rows, columns), for the offsets ``rows_at`` (rows) and ``columns_at`` (columns), in positions, ascending;
+    1-D layouts have one row. ``condition``: the largest ratio of singular values of a residue's system (that of A is its square). ``deficient``:
+    how many residues' systems are singular, of ``residues``; their solutions are the smallest ones (truncated pseudo-inverse).
+    ``step``: cycles per degree between neighboring frequencies, along rows and columns.
+    """
+
+    layout: Layout
+    viewing: Viewing
+    sensitivity: Sensitivity
+    h: F64
+    rows_at: npt.NDArray[np.int64]
+    columns_at: npt.NDArray[np.int64]
+    condition: float
+    deficient: int
+    residues: int
+    step: tuple[float, float]
+
+    @property
+    def singular(self) -> bool:
+        """Whether some frequencies leave the solution open."""
+        return self.deficient > 0
+
+    def own(self, subpixel: int) -> F64:
+        """The kernel that leads from a subpixel's own primary to it, float64 (rows, columns): the low-pass one."""
+        return np.asarray(self.h[subpixel, self.layout.active_primaries[subpixel]])
+
+
+def derive(
+    layout: Layout, viewing: Viewing | None = None, sensitivity: Sensitivity | None = None, size: tuple[int, int] | None = None
+) -> Kernels:
+    """Solve for all kernels of a layout (thesis 4.3.2, 4.3.5). ``size``: positions of the periodic signal, (rows, columns).
+
+    Raises ValueError where ``size`` is no multiple of the pattern's period.
+    """
+    viewing, sensitivity = viewing or Viewing(), sensitivity or exponential()
+    rows, columns = size or default_size(layout)
+    pattern_rows, pattern_columns = layout.pattern.shape
+    if rows % pattern_rows or columns % pattern_columns or rows < 1 or columns < 1:
+        raise ValueError(f"{layout.name}: expected whole periods of {pattern_columns} x {pattern_rows} positions, found {columns} x {rows}")
+
+    # Frequencies of every residue: bins (residues, P) along both axes, their cycles per degree, and the weights of the three channels
+    row_bins = np.arange(rows // pattern_rows)[:, None] + np.arange(pattern_rows) * (rows // pattern_rows)
+    column_bins = np.arange(columns // pattern_columns)[:, None] + np.arange(pattern_columns) * (columns // pattern_columns)
+    step = _steps(layout, viewing, rows, columns)
+    f_row, f_column = np.minimum(row_bins, rows - row_bins) * step[0], np.minimum(column_bins, columns - column_bins) * step[1]
+    f = np.hypot(f_row[:, None, :, None], f_column[None, :, None, :])  # (Ry, Rx, Py, Px)
+    root = np.sqrt(sensitivity.weights(f))  # (3, Ry, Rx, Py, Px)
+
+    # Phase of each position of a period at each frequency: (Ry, Rx, Py, Px, positions)
+    at = np.argwhere(np.ones_like(layout.pattern))
+    phase_row = np.exp(-2j * np.pi * row_bins[:, :, None] * at[:, 0] / rows)
+    phase_column = np.exp(-2j * np.pi * column_bins[:, :, None] * at[:, 1] / columns)
+    phase = phase_row[:, None, :, None, :] * phase_column[None, :, None, :, :]
+
+    # min |G a - H|: rows are (channel, frequency), unknowns are subpixels, right sides are impulses (channel of the signal, position)
+    residues = f.shape[0] * f.shape[1]
+    shown = layout.spacing * layout.opponent[:, layout.active_primaries]  # s m_q, (3, subpixels)
+    active = layout.active[:, 0] * pattern_columns + layout.active[:, 1]
+    weighed = np.moveaxis(root, 0, 2)[..., None] * phase[:, :, None]  # (Ry, Rx, 3, Py, Px, positions)
+    g = weighed[..., active] * shown[:, None, None, :]
+    wanted = weighed[..., None, :] * layout.opponent[:, None, None, :, None]  # (…, primaries, positions)
+    a, condition, deficient = _solve(g.reshape(residues, -1, len(active)), wanted.reshape(residues, g[0, 0].size // len(active), -1))
+
+    # a holds the spectra over periods: back to positions, then from (subpixel <- impulse) to offsets
+    a = a.reshape(f.shape[0], f.shape[1], len(active), len(layout.primaries), len(at))
+    response = np.fft.ifft2(a, axes=(0, 1)).real  # (periods down, periods across, subpixels, primaries, impulses)
+    h, rows_at, columns_at = _by_offset(response, layout, at, rows, columns)
+    return Kernels(layout, viewing, sensitivity, h, rows_at, columns_at, condition, deficient, residues, step)
+
+
+def default_size(layout: Layout) -> tuple[int, int]:
+    """How many positions, (rows, columns), the signal of a derivation has unless it is given."""
+    rows, columns = layout.pattern.shape
+    pixels = PIXELS_1D if layout.one_dimensional else PIXELS_2D
+    across = columns * max(1, round(pixels * layout.cells[0] / columns))
+    return 1 if layout.one_dimensional else rows * max(1, round(pixels * layout.cells[1] / rows)), across
+
+
+def _steps(layout: Layout, viewing: Viewing, rows: int, columns: int) -> tuple[float, float]:
+    """Cycles per degree between neighboring bins, along rows and columns."""
+    width, height = layout.cells
+    return height / (rows * viewing.degrees_per_pixel), width / (columns * viewing.degrees_per_pixel)
+
+
+def _solve(g: C128, wanted: C128) -> tuple[C128, float, int]:
+    """Least squares for each residue; the largest condition number, and how many residues were singular."""
+    u, s, vh = np.linalg.svd(g, full_matrices=False)
+    largest = s[:, :1].max(initial=0.0)
+    kept = s > RANK_TOLERANCE * np.maximum(s[:, :1], RANK_TOLERANCE * largest)
+    inverse = np.where(kept, 1.0 / np.where(kept, s, 1.0), 0.0)
+    a = np.conj(np.swapaxes(vh, 1, 2)) @ (inverse[:, :, None] * (np.conj(np.swapaxes(u, 1, 2)) @ wanted))
+    smallest = np.maximum(s[:, -1], np.finfo(np.float64).tiny)
+    return a, float((s[:, 0] / smallest).max()), int((~kept.all(axis=1)).sum())
+
+
+def _by_offset(
+    response: F64, layout: Layout, at: npt.NDArray[np.int64], rows: int, columns: int
+) -> tuple[F64, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """h_{p,d}(o) of the responses of all subpixels to impulses at the positions of one period."""
+    pattern_rows, pattern_columns = layout.pattern.shape
+    down, across, subpixels, primaries, _ = response.shape
+    low_row, low_column = -(rows // 2), -(columns // 2)
+    h = np.zeros((subpixels, primaries, rows, columns))
+    period_row, period_column = np.arange(down) * pattern_rows, np.arange(across) * pattern_columns
+    for p, (row, column) in enumerate(layout.active):
+        for k, (impulse_row, impulse_column) in enumerate(at):
+            offset_row = (impulse_row - row - period_row - low_row) % rows
+            offset_column = (impulse_column - column - period_column - low_column) % columns
+            h[p][:, offset_row[:, None], offset_column] = np.moveaxis(response[:, :, p, :, k], 2, 0)
+    return h, low_row + np.arange(rows), low_column + np.arange(columns)
