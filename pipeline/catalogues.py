@@ -118,7 +118,7 @@ def merged_words(folder: RunFolder, shards: tuple[Shard, ...]) -> pa.Table:
 
 # --- the run ------------------------------------------------------------------------------------------------------
 
-_COUNTS = ("camera_vertices", "light_vertices", "paths", "occluded", "words")
+COUNTED = ("camera_vertices", "light_vertices", "paths", "occluded", "unlit")  # tables whose rows the shards count
 
 
 def run_row(name: str, settings: TraceSettings, scene: Scene, versions: dict[str, str], rows: dict[str, int]) -> pa.Table:
@@ -143,5 +143,5 @@ def run_row(name: str, settings: TraceSettings, scene: Scene, versions: dict[str
         ("scene", pa.string(), json.dumps(scene.description, default=str)),
         ("versions", pa.string(), json.dumps(versions)),
     ]
-    values += [(f"{table}_rows", pa.uint64(), rows.get(table, 0)) for table in _COUNTS]
+    values += [(f"{table}_rows", pa.uint64(), rows.get(table, 0)) for table in (*COUNTED, "words")]
     return pa.table([pa.array([value], kind) for _, kind, value in values], names=[column for column, _, _ in values])

@@ -240,6 +240,44 @@ def report(
 
 
 @app.command()
+def subpixel(
+    target: Annotated[pathlib.Path | None, typer.Argument(metavar="RUN_OR_IMAGE", help="A run folder, or an image file.")] = None,
+    layout: Annotated[
+        list[str] | None, typer.Option("--layout", metavar="NAME", help="A display (--list names them), or a YAML file with one; repeatable.")
+    ] = None,
+    method: Annotated[str | None, typer.Option("--method", metavar="NAME", help="How the picture is filtered (default: optimal).")] = None,
+    dpi: Annotated[float | None, typer.Option("--dpi", help="Pixels of the display per inch (default: 100).")] = None,
+    distance: Annotated[float | None, typer.Option("--distance", metavar="CM", help="Distance of the viewer, centimeters (default: 46).")] = None,
+    scale: Annotated[
+        float | None, typer.Option("--scale", metavar="N", min=1, max=100, help="Pixels of the image for each of the display's (default: 3).")
+    ] = None,
+    expression: Annotated[str | None, typer.Option("--expression", metavar="EXPR", help="Show only the light of a run that this selects.")] = None,
+    evaluate: Annotated[bool | None, typer.Option("--evaluate/--no-evaluate", help="Compare all methods (default: yes).")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A key of `analysis.subpixel`, such as `zeros=3`; repeatable.")
+    ] = None,
+    define: DefineOption = None,
+    out: Annotated[
+        pathlib.Path | None,
+        typer.Option("--out", metavar="DIR", help="The folder to write (default: `subpixel` in the run folder, `<image>-subpixel` here)."),
+    ] = None,
+    list_them: Annotated[bool, typer.Option("--list", help="List the displays.")] = False,
+) -> None:
+    """Filter a run's samples, or an image, for the subpixels of a display, and compare the ways to do so."""
+    with _clear_exit():
+        from pipeline.subpixel import list_layouts, print_analysis
+
+        if list_them:
+            list_layouts()
+        elif target is None:
+            raise JobError("expected a run folder or an image: pathspace subpixel RUN_OR_IMAGE --layout rgb_stripe")
+        else:
+            named = {"method": method, "dpi": dpi, "distance": distance, "evaluate": evaluate}
+            given = {key: value for key, value in named.items() if value is not None}
+            print_analysis(target, layout or (), given, settings or (), scale, expression, define or (), out)
+
+
+@app.command()
 def export(
     run: RunArgument,
     parquet: Annotated[pathlib.Path, typer.Option("--parquet", metavar="DIR", help="The folder to write Parquet files into.")],

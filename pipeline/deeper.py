@@ -19,7 +19,7 @@ from pipeline.config import Job
 from pipeline.errors import JobError
 from pipeline.identity import scene_digest
 from pipeline.job_file import LoadedJob
-from pipeline.prepare import compile_scene
+from pipeline.prepare import compile_scene, with_texture_filter
 from queries.diagnostics.answers import INTEGER, REAL, TEXT, Figure, answer, pixels_of, require_paths
 from queries.diagnostics.depths import segments
 from queries.errors import QueryError
@@ -180,7 +180,8 @@ def _from_job(run: Run) -> Scene:
 def _from_description(run: Run) -> Scene:
     loaded = _loaded(run)
     folder = loaded.folder if isinstance(loaded.scene, dict) else pathlib.Path(loaded.scene).parent
-    return load_scene(json.loads(run.tables["run"]["scene"][0].as_py()), base=folder.absolute())
+    scene = load_scene(json.loads(run.tables["run"]["scene"][0].as_py()), base=folder.absolute())
+    return with_texture_filter(scene, loaded.job)
 
 
 # --- tracing again ------------------------------------------------------------------------------------------------

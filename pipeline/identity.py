@@ -26,21 +26,26 @@ def trace_settings(job: Job, scene: Scene) -> TraceSettings:
     render, defaults = job.render, scene.defaults
     width, height = render.resolution or (defaults.width, defaults.height)
     depth = defaults.max_depth if render.max_depth is None else render.max_depth
-    settings = TraceSettings(
-        method=render.method or defaults.method,
-        width=width,
-        height=height,
-        passes=render.samples or defaults.samples,
-        max_depth=UNBOUNDED_DEPTH if depth < 0 else min(depth, UNBOUNDED_DEPTH),
-        rr_depth=min(render.rr_depth or defaults.rr_depth, UNBOUNDED_DEPTH + 1),  # no walk is deeper, so never
-        seed=defaults.seed if render.seed is None else render.seed,
-        sampler=render.sampler or defaults.sampler,
-        replicates=render.replicates,
-        filter=render.filter or defaults.filter,
-        keep=job.record.share,
-        columns=frozenset(job.record.columns),
-        occluded=job.record.occluded,
-    )
+    try:
+        settings = TraceSettings(
+            method=render.method or defaults.method,
+            width=width,
+            height=height,
+            passes=render.samples or defaults.samples,
+            max_depth=UNBOUNDED_DEPTH if depth < 0 else min(depth, UNBOUNDED_DEPTH),
+            rr_depth=min(render.rr_depth or defaults.rr_depth, UNBOUNDED_DEPTH + 1),  # no walk is deeper, so never
+            seed=defaults.seed if render.seed is None else render.seed,
+            sampler=render.sampler or defaults.sampler,
+            replicates=render.replicates,
+            filter=render.filter or defaults.filter,
+            keep=job.record.share,
+            columns=frozenset(job.record.columns),
+            occluded=job.record.occluded,
+            texture_filter=render.texture_filter,
+            texture_layout=render.texture_layout,
+        )
+    except ValueError as error:
+        raise JobError(f"render: {error}") from None
     if settings.walks > MAX_WALKS:
         raise JobError(f"{settings.walks} walks are more than a run can hold ({MAX_WALKS}): lower render.samples or render.resolution")
     return settings
@@ -54,7 +59,10 @@ def settings_as_json(settings: TraceSettings) -> dict[str, Any]:
 def scene_digest(scene: Scene) -> str:
     """SHA-256, in hexadecimal, of all that the scene gives to kernels and catalogues (not of file names or formatting)."""
     digest = hashlib.sha256()
-    _add(digest, scene.arrays)
+    *arrays, ewa = scene.arrays
+    _add(digest, arrays)
+    if ewa is not None:
+        _add(digest, [value for name, value in ewa._asdict().items() if name != "pyramid"])  # smaller versions of what is in already
     _add(digest, [asdict(item) for item in scene.objects])
     _add(digest, [asdict(item) for item in scene.emitters])
     _add(digest, (scene.vertices, scene.triangles))

@@ -2,7 +2,7 @@
 
 import os
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -20,16 +20,26 @@ def write_exr(path: pathlib.Path, image: F32, metadata: Mapping[str, str]) -> No
 
 def write_layers(path: pathlib.Path, layers: Mapping[str, F32], metadata: Mapping[str, str]) -> None:
     """Write images of one size, float32 (height, width, 3), as layers of one EXR: channels ``name.R``, ``name.G``, ``name.B``; R, G, B for ``""``."""
-    height, width, _ = next(iter(layers.values())).shape
-    spec = oiio.ImageSpec(width, height, 3 * len(layers), oiio.FLOAT)
-    spec.channelnames = tuple(f"{name}.{channel}" if name else channel for name in layers for channel in "RGB")
+    channels = [f"{name}.{channel}" if name else channel for name in layers for channel in "RGB"]
+    _write_exr(path, channels, np.concatenate([np.asarray(image, np.float32) for image in layers.values()], axis=2), metadata)
+
+
+def write_plane(path: pathlib.Path, plane: F32, metadata: Mapping[str, str]) -> None:
+    """Write numbers, float32 (rows, columns), as the only channel, Y, of an EXR."""
+    _write_exr(path, ["Y"], np.ascontiguousarray(plane[:, :, None], np.float32), metadata)
+
+
+def _write_exr(path: pathlib.Path, channels: Sequence[str], pixels: F32, metadata: Mapping[str, str]) -> None:
+    height, width, _ = pixels.shape
+    spec = oiio.ImageSpec(width, height, len(channels), oiio.FLOAT)
+    spec.channelnames = tuple(channels)
     spec.attribute("compression", "zip")
     spec.attribute("DateTime", "")  # otherwise the time of day is written, and equal images are unequal files
     spec.attribute("Software", f"pathspace {metadata.get('version', '')}".strip())
     spec.attribute("oiio:ColorSpace", "lin_rec709_scene")
     for key, value in metadata.items():
         spec.attribute(f"pathspace:{key}", value)
-    _write(path, spec, np.concatenate([np.asarray(image, np.float32) for image in layers.values()], axis=2))
+    _write(path, spec, pixels)
 
 
 def write_png(path: pathlib.Path, image: F32, exposure: float = 0.0) -> None:

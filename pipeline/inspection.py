@@ -5,12 +5,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from pipeline.config import Images
+from pipeline.config import Analysis, Images
 from pipeline.estimate import SizeEstimate, estimate_size
 from pipeline.identity import differences, fingerprint
 from pipeline.prepare import PreparedJob
 from pipeline.run_folder import RunFolder
 from queries.inspection import FOLDER
+from renderer.textures.pixel_filter import without_ewa
 from renderer.trace import Tracer
 
 
@@ -24,12 +25,13 @@ def inspection_job(prepared: PreparedJob) -> PreparedJob | None:
     asked = prepared.loaded.job.inspection
     if asked is None or prepared.settings.method == "light":
         return None
-    settings = replace(prepared.settings, method="light", passes=asked.samples, keep=1.0, columns=frozenset(), occluded=False)
+    plain: dict[str, Any] = {"keep": 1.0, "columns": frozenset(), "occluded": False, "texture_filter": "point", "texture_layout": None}
+    settings, scene = replace(prepared.settings, method="light", passes=asked.samples, **plain), without_ewa(prepared.scene)
     job = prepared.loaded.job
-    bare: dict[str, Any] = {"aovs": {}, "rank": {}, "views": {}, "report": None, "inspection": None, "images": Images()}
-    render = job.render.model_copy(update={"method": "light", "samples": asked.samples})
+    bare: dict[str, Any] = {"aovs": {}, "rank": {}, "views": {}, "report": None, "inspection": None, "analysis": Analysis(), "images": Images()}
+    render = job.render.model_copy(update={"method": "light", "samples": asked.samples, "texture_filter": "point", "texture_layout": None})
     loaded = replace(prepared.loaded, job=job.model_copy(update={**bare, "render": render}))
-    return PreparedJob(loaded, prepared.scene, settings, fingerprint(settings, prepared.scene))
+    return PreparedJob(loaded, scene, settings, fingerprint(settings, scene))
 
 
 def size_with_inspection(prepared: PreparedJob, tracer: Tracer) -> SizeEstimate:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.config import Job
 from pipeline.errors import JobError
 from pipeline.identity import fingerprint, trace_settings
 from pipeline.job_file import LoadedJob, load_job
@@ -42,6 +43,39 @@ def prepare_job(path: pathlib.Path, overrides: Sequence[str] = ()) -> PreparedJo
 
 
 def compile_scene(loaded: LoadedJob) -> Scene:
+    """The job's scene, with its film at the job's resolution and the job's filter of textures. Raises JobError and SceneError."""
+    return with_texture_filter(compile_film(loaded), loaded.job)
+
+
+def with_texture_filter(scene: Scene, job: Job) -> Scene:
+    """The scene with the filter over bitmaps that the job asks for. Raises JobError for displays whose pixels are no triples of R, G and B."""
+    render = job.render
+    if render.texture_filter == "point":
+        return scene
+    from renderer.textures.pixel_filter import triples, with_ewa
+
+    if render.texture_layout is None:
+        return with_ewa(scene)
+    from queries.subpixel.description import SubpixelDescription, shipped_layouts
+    from renderer.filters.subpixel.derive import derive
+    from renderer.filters.subpixel.methods import subpixel_filter
+    from renderer.filters.subpixel.windowed_sinc import fit
+
+    # The display as the job's analysis describes it, which also says from where it is seen
+    asked = job.analysis.subpixel or SubpixelDescription()
+    layouts = {**shipped_layouts(), **asked.custom}
+    if render.texture_layout not in layouts:
+        raise JobError(f"render.texture_layout: there is no layout `{render.texture_layout}`: known are {', '.join(layouts)}")
+    layout = layouts[render.texture_layout].layout(render.texture_layout)
+    try:
+        triples(layout)
+        fits = fit(derive(layout, asked.viewing, asked.sensitivity.sensitivity()))
+        return with_ewa(scene, subpixel_filter("optimal", layout, fits, asked.zeros))
+    except ValueError as error:
+        raise JobError(f"render.texture_layout: {error}") from None
+
+
+def compile_film(loaded: LoadedJob) -> Scene:
     """The job's scene, with its film at the job's resolution."""
     job = loaded.job
     inline = not isinstance(loaded.scene, str)

@@ -30,6 +30,8 @@ def check_questions(loaded: LoadedJob, scene: Scene | None = None) -> None:
                 f"`{section}` is computed from the tables, and `record.keep: none` keeps none: record all walks or a fraction, or drop `{section}`",
                 next(iter(place.values())),
             )
+    if job.analysis.subpixel is not None and job.record.share == 0.0:
+        raise JobError("`analysis.subpixel` filters recorded samples, and `record.keep: none` keeps none: record all walks or a fraction, or drop it")
     _check_regions(loaded, scene)
     _check_expressions(loaded, scene)
     for name, asked in job.rank.items():

@@ -37,12 +37,11 @@ class ShardTables:
             self.rows[table] = 0
 
     def write(self, table: str, batch: pa.RecordBatch) -> None:
-        """Append a batch, which may alias memory that is about to change."""
+        """Append a batch, which may alias memory that is about to change. Batches without rows too: those of all tables hold the same walks."""
         if self.stop.is_set():
             raise Interrupted("interrupted")
-        if batch.num_rows:
-            self.writers[table].write_batch(batch)
-            self.rows[table] += batch.num_rows
+        self.writers[table].write_batch(batch)
+        self.rows[table] += batch.num_rows
 
     def commit(self) -> dict[pathlib.Path, FileRecord]:
         """Finish every file and give it its name."""

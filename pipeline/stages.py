@@ -1,14 +1,10 @@
 """A run, stage by stage: compile the scene, trace, sum the film, write catalogues and images, then answer what the job asks and draw it."""
 
-import contextlib
 import functools
 import pathlib
-import resource
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from typing import Any
 
 from pipeline import catalogues, film_sum, images
@@ -23,34 +19,12 @@ from pipeline.progress import LOG, log_file, progress
 from pipeline.questions import region_terms
 from pipeline.run_folder import COMPLETE, RENDERING, RunFolder
 from pipeline.shards import Shard, plan_shards, shard_count, shard_size
+from pipeline.stopwatch import Stopwatch, peak_rss_bytes
 from queries.shards import cores
 from renderer.film import Film
 from renderer.trace import Tracer
 
 LAYERS = "layers"  # the file of all images: no AOV may have its name
-
-
-@dataclass
-class Stopwatch:
-    """Seconds of each stage, by name, and the process's peak memory by its end (bytes)."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-    peaks: dict[str, int] = field(default_factory=dict)
-
-    @contextlib.contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time a stage, also where it fails."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-            self.peaks[name] = peak_rss_bytes()
-
-
-def peak_rss_bytes() -> int:
-    """Most memory that the process has held so far, memory-mapped files included."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def validate_job(path: pathlib.Path, overrides: Sequence[str] = (), out: pathlib.Path | None = None) -> tuple[PreparedJob, SizeEstimate]:
@@ -116,6 +90,8 @@ class Run:
             self._trace_inspection()
         with self.watch.stage("views"):
             self._write_views()
+        with self.watch.stage("subpixel"):
+            self._analyze_subpixels()
         self._save()
         with self.watch.stage("report"):
             self._write_report()
@@ -160,6 +136,7 @@ class Run:
             "images": old.get("images", {}),
             "rankings": old.get("rankings", {}),
             "views": old.get("views", {}),
+            "subpixel": old.get("subpixel", {}),
             "stats": old.get("stats", {}),
         }
 
@@ -253,7 +230,7 @@ class Run:
             for key, value in record["counts"].items():
                 rows[key] = rows.get(key, 0) + value
             size += sum(file["bytes"] for name, file in record["files"].items() if name.startswith("tables/"))
-        counts = {table: rows.get(f"{table}_rows", 0) for table in ("camera_vertices", "light_vertices", "paths", "occluded")}
+        counts = {table: rows.get(f"{table}_rows", 0) for table in catalogues.COUNTED}
         words = catalogues.merged_words(self.folder, self.shards if self.settings.keep > 0 else ())
         run = catalogues.run_row(self.job.name, self.settings, self.scene, self.manifest["versions"], {**counts, "words": words.num_rows})
         written = catalogues.write_catalogues(self.folder, self.scene, run, words)
@@ -313,6 +290,14 @@ class Run:
                 for name, drawn in write_views(self.folder, self.job, terms, self.manifest["views"], self.threads, bar):
                     self.manifest["views"][name] = drawn
                     self._save()  # an interrupted job goes on with the next view
+
+    def _analyze_subpixels(self) -> None:
+        """Derive, apply and compare the subpixel filters that the job asks for."""
+        if self.job.analysis.subpixel is not None:
+            from pipeline.subpixel import write_job_analysis
+
+            LOG.info("analyzing subpixel filters …")
+            self.manifest["subpixel"] = write_job_analysis(self.folder, self.job.analysis.subpixel, self.manifest["subpixel"], self.threads)
 
     def _write_report(self) -> None:
         """Write the report that the job asks for, anew each time: it tells what is in the folder now."""

@@ -103,6 +103,14 @@ class Run:
         if self.settings["keep"] <= 0 or "paths" not in self.tables:
             raise QueryError(f"`{self.path}` recorded no paths (record.keep is none), so {lost}: record some, as in `keep: 0.1`")
 
+    def require_unlit(self, wanted: str) -> None:
+        """Raise ``QueryError`` where the run does not know the film positions of camera walks that carried nothing, so cannot be ``wanted``."""
+        if "unlit" not in self.tables:
+            raise QueryError(
+                f"`{self.path}` cannot be {wanted}: it was rendered before camera walks that carry nothing were recorded (table `unlit`), "
+                "and they count in the weights of a filter. Render it again"
+            )
+
     def require_whole(self) -> None:
         """Raise ``QueryError`` where only some shards are open."""
         found, shards = len(self.shard_files), self.manifest["shards"]["count"]

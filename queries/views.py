@@ -3,9 +3,9 @@
 import duckdb
 import pyarrow as pa
 
-from renderer.tables import ARROW_TYPES, CAMERA_VERTICES, LIGHT_VERTICES, OCCLUDED, PATHS, WORDS, Table
+from renderer.tables import ARROW_TYPES, RECORDED_TABLES, Table
 
-RECORDED = {table.name: table for table in (CAMERA_VERTICES, LIGHT_VERTICES, PATHS, OCCLUDED, WORDS)}
+RECORDED = {table.name: table for table in RECORDED_TABLES}
 CATALOGUES = ("events", "techniques", "objects", "emitters", "triangles", "run")
 
 _WIDENED = {pa.uint8(): "INTEGER", pa.uint16(): "INTEGER", pa.uint32(): "BIGINT"}

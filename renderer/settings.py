@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+TEXTURE_FILTERS = ("point", "ewa")
 UNBOUNDED_DEPTH = 255  # depths are stored in a byte; `max_depth: -1` means this
 
 
@@ -22,6 +23,24 @@ class TraceSettings:
     keep: float = 1.0  # share of the walks that are recorded, chosen by a hash of their ids; 0 records nothing
     columns: frozenset[str] = field(default_factory=frozenset)  # optional columns to record: primitive, u, v
     occluded: bool = False  # record blocked connections too
+    texture_filter: str = "point"  # or "ewa": how bitmaps are read where the camera sees them
+    texture_layout: str | None = None  # with "ewa", the display whose subpixel filters are folded in
+
+    def __post_init__(self) -> None:
+        """Check that the texture's filter goes with the rest. Raises ValueError."""
+        if self.texture_filter not in TEXTURE_FILTERS:
+            raise ValueError(f"unknown texture filter {self.texture_filter!r}; known: {', '.join(TEXTURE_FILTERS)}")
+        if self.texture_filter == "point":
+            if self.texture_layout is not None:
+                raise ValueError(f"the texture layout {self.texture_layout!r} is for the texture filter 'ewa'; the filter is 'point'")
+            return
+        if self.method != "path":
+            raise ValueError(f"the texture filter 'ewa' is for camera walks, method 'path'; the method is {self.method!r}")
+        if self.filter != "box":
+            raise ValueError(
+                f"the texture filter 'ewa' needs the film's filter 'box', but that is {self.filter!r}: all samples of a pixel have the pixel's "
+                "filtered color already, so any wider filter would blur it a second time"
+            )
 
     @property
     def walks_per_pass(self) -> int:

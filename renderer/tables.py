@@ -1,8 +1,9 @@
 """The tables of a run, declared once: kernels fill these columns, files hold them, SQL reads them (DESIGN §4).
 
 ``VERTEX`` rows are the vertices of walks, key (walk, depth). ``PATH`` rows are the full paths, or lobes' shares of
-one, that an estimator evaluated, key (owning walk, path). ``OCCLUDED`` rows are connections that were blocked. A column
-that a run cannot fill is not stored; the views of ``queries`` supply NULL for it.
+one, that an estimator evaluated, key (owning walk, path). ``OCCLUDED`` rows are connections that were blocked. ``UNLIT``
+rows are the camera walks that made no path: with the walks of ``PATHS`` they are all that were recorded. A column that a
+run cannot fill is not stored; the views of ``queries`` supply NULL for it.
 """
 
 from dataclasses import dataclass, field
@@ -143,6 +144,14 @@ _PATH_COLUMNS = (
 PATHS = Table("paths", _PATH_COLUMNS)
 _BLOCKER = Column("blocker", "uint16", "the first object that blocked the connection; 65535 where a grazing ray met none the second time")
 OCCLUDED = Table("occluded", (*_PATH_COLUMNS, _BLOCKER))
+UNLIT = Table(
+    "unlit",
+    (
+        Column("camera_walk", "walk", "the camera walk that carried nothing"),
+        Column("raster_x", "float32", "where on the film, in pixels; strictly inside the film"),
+        Column("raster_y", "float32", "see raster_x"),
+    ),
+)
 WORDS = Table(
     "words",
     (
@@ -152,4 +161,4 @@ WORDS = Table(
         Column("object", "uint16", "key into objects: where it happened"),
     ),
 )
-RECORDED_TABLES = (CAMERA_VERTICES, LIGHT_VERTICES, PATHS, OCCLUDED, WORDS)
+RECORDED_TABLES = (CAMERA_VERTICES, LIGHT_VERTICES, PATHS, OCCLUDED, UNLIT, WORDS)

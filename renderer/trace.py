@@ -25,7 +25,8 @@ from renderer.math.vec import FAR
 from renderer.samples import primary_samples
 from renderer.scene.arrays import Scene
 from renderer.settings import TraceSettings
-from renderer.tables import NO_OBJECT, OCCLUDED, PATHS, WORDS
+from renderer.tables import NO_OBJECT, OCCLUDED, PATHS, UNLIT, WORDS
+from renderer.textures.pixel_filter import with_memory
 
 TILE = 1 << 15  # walks that advance together: enough to hide Python, few enough for the cache
 WARM_UP_WALKS = 256
@@ -61,14 +62,17 @@ class Tracer:
     """Traces walks of one scene with one estimator. One for each thread: it owns the tile's buffers.
 
     ``accelerators`` may be shared between threads; without it, the tracer builds its own. Raises ValueError where the
-    settings' film is not the scene's: kernels would write outside of it.
+    settings' film is not the scene's, since kernels would write outside of it, or where the scene's texture filter is not the settings'.
     """
 
     def __init__(self, scene: Scene, settings: TraceSettings, accelerators: Accelerators | None = None, tile: int = TILE) -> None:
         sensor = scene.arrays.sensor
         if (sensor.width, sensor.height) != (settings.width, settings.height):
             raise ValueError(f"settings of a {settings.width} x {settings.height} film, but the scene's is {sensor.width} x {sensor.height}")
+        if scene.arrays.ewa is not None and settings.texture_filter != "ewa":
+            raise ValueError(f"the scene has the texture filter 'ewa', but the settings ask for {settings.texture_filter!r}")
         self.scene = scene
+        self.arrays = with_memory(scene.arrays)
         self.settings = settings
         self.accelerators = accelerators or Accelerators(scene)
         self.buffers = TileBuffers(min(tile, max(1, settings.walks)))
@@ -127,7 +131,7 @@ class Tracer:
         buffers, settings = self.buffers, self.settings
         buffers.reserve(Counters(0, 0, 0, 0, 0), n)
         counters = self.estimator.start(
-            self.scene.arrays, self.samples, buffers.lanes, buffers.rays, buffers.t, n, settings.max_depth, recording,
+            self.arrays, self.samples, buffers.lanes, buffers.rays, buffers.t, n, settings.max_depth, recording,
             buffers.shadow, buffers.vertices, buffers.paths,
         )  # fmt: skip
         counters, occluded = self._connect(counters, 0, 0, recording)
@@ -139,7 +143,7 @@ class Tracer:
             buffers.reserve(counters, active)
             asked = counters.paths
             counters = self.estimator.interact(
-                self.scene.arrays, self.samples, buffers.lanes, buffers.rays, t, primitives, depth, settings.max_depth,
+                self.arrays, self.samples, buffers.lanes, buffers.rays, t, primitives, depth, settings.max_depth,
                 settings.rr_depth, recording, buffers.next_rays, buffers.shadow, buffers.vertices, buffers.paths, buffers.words,
                 counters,
             )  # fmt: skip
@@ -185,6 +189,10 @@ class Tracer:
         counts.vertices += vertices.num_rows
         counts.paths += paths.num_rows
         counts.bytes += vertices.nbytes + paths.nbytes
+        if self.settings.method == "path":
+            unlit = recorder.unlit(buffers.lanes, n)
+            write(UNLIT.name, unlit)
+            counts.bytes += unlit.nbytes
         if self.settings.occluded:
             blocked = recorder.paths(buffers.occluded, occluded, buffers.lanes, n, OCCLUDED)
             write(OCCLUDED.name, blocked)

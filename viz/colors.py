@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.errors import QueryError
+from queries.srgb import to_srgb
 from viz.tools.base import Color
 
 if TYPE_CHECKING:
@@ -96,18 +97,6 @@ def as_bytes(colors: npt.NDArray[np.floating]) -> U8:
 def as_color(rgb: npt.NDArray[np.floating]) -> Color:
     """One color (3,) as legends have it."""
     return float(rgb[0]), float(rgb[1]), float(rgb[2])
-
-
-def to_srgb(linear: npt.NDArray[np.floating]) -> F32:
-    """Linear RGB, cut to 0 … 1, encoded for screens (IEC 61966-2-1): float32 of the same shape."""
-    x = np.clip(np.asarray(linear, np.float32), 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4, dtype=np.float32) - 0.055).astype(np.float32)
-
-
-def to_linear(srgb: npt.NDArray[np.floating]) -> F32:
-    """The inverse of ``to_srgb``."""
-    x = np.clip(np.asarray(srgb, np.float32), 0, 1)
-    return np.where(x <= 0.04045, x / 12.92, np.power((x + 0.055) / 1.055, 2.4, dtype=np.float32)).astype(np.float32)
 
 
 def from_oklab(lab: npt.NDArray[np.floating]) -> F32:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from queries.errors import QueryError
-from viz.colors import to_linear
+from queries.srgb import to_linear
 
 if TYPE_CHECKING:
     import pyvista

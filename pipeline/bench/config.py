@@ -13,8 +13,8 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.config import NAME_PATTERN, Section
 from pipeline.errors import JobError
 
-SectionName = Literal["rates", "size", "memory", "error", "start", "features", "questions", "pictures"]
-_NO_QUESTIONS = ("aovs={}", "rank={}", "views={}", "inspection=null", "report=null")
+SectionName = Literal["rates", "size", "memory", "error", "start", "features", "questions", "pictures", "subpixel"]
+_NO_QUESTIONS = ("aovs={}", "rank={}", "views={}", "inspection=null", "report=null", "analysis={}")
 ContenderName = Literal["independent", "sobol", "recorded", "recorded_sobol", "mitsuba_llvm", "mitsuba_scalar"]
 
 
@@ -77,6 +77,17 @@ class Pictures(Section):
     most_drawing_seconds: float = Field(default=15.0, gt=0, description="The goal for drawing, seconds.")
 
 
+class Subpixel(Section):
+    """Images for the subpixels of displays, from a run of the job that records every path."""
+
+    layouts: list[str] = Field(default=["rgb_stripe", "rgbg", "rgbw"], min_length=1, description="The displays; the goal is for the first.")
+    methods: list[str] = Field(
+        default=["pixel_box", "pixel_mitchell", "none", "box", "mitchell", "optimal", "kernels"], description="How images are filtered."
+    )
+    most_ratio: float = Field(default=3.0, gt=0, description="The goal: `optimal` on the first display, in times of the run's box image.")
+    most_derivation_seconds: float = Field(default=2.0, gt=0, description="The goal for deriving and fitting the filters of all layouts, seconds.")
+
+
 class Benchmark(Section):
     """A benchmark file. Paths in it are relative to the file."""
 
@@ -95,6 +106,7 @@ class Benchmark(Section):
     features: Features = Field(default=Features(), description="The cost of absent features.")
     questions: Questions = Field(default=Questions(), description="Questions of a recorded run.")
     pictures: Pictures = Field(default=Pictures(), description="Pictures of bundled paths.")
+    subpixel: Subpixel = Field(default=Subpixel(), description="Subpixel filters.")
     out: str | None = Field(
         default=None, min_length=1, description="The folder of the results. Default: `runs/bench-<name>` where the command is run."
     )

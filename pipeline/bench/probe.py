@@ -9,7 +9,8 @@ from typing import Any
 
 from pipeline.estimate import estimate_size
 from pipeline.prepare import prepare_job
-from pipeline.stages import peak_rss_bytes, run_job
+from pipeline.stages import run_job
+from pipeline.stopwatch import peak_rss_bytes
 from renderer.accelerators import Accelerators
 from renderer.trace import Tracer
 

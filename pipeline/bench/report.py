@@ -25,6 +25,7 @@ TITLES = {
     "features": "Absent features",
     "questions": "Questions",
     "pictures": "Pictures",
+    "subpixel": "Subpixel filters",
 }
 
 

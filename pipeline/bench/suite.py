@@ -17,6 +17,7 @@ from pipeline.bench.results import SectionResult
 from pipeline.bench.session import Session
 from pipeline.bench.size import measure_size
 from pipeline.bench.start import measure_start
+from pipeline.bench.subpixel import measure_subpixel
 from pipeline.errors import DONE
 from pipeline.files import clear_errors
 from pipeline.prepare import prepare_job
@@ -31,6 +32,7 @@ SECTIONS: dict[str, Callable[[Session], SectionResult]] = {
     "features": measure_features,
     "questions": measure_questions,
     "pictures": measure_pictures,
+    "subpixel": measure_subpixel,
 }
 
 

@@ -1,6 +1,6 @@
 """Contributions of paths to pixels: the film's sums, made of the rows that were chosen.
 
-Every kernel adds to ``image``, float64 (rows, width, 3), which is the film from row ``first_row`` on; what falls beside it is left out.
+Kernels add to ``image``, float64 (rows, width, 3), which is the film from row ``first_row`` on; what falls beside it is left out.
 """
 
 import numpy as np
@@ -66,3 +66,33 @@ def splat_filter(
                     image[row, column, 0] += weight * np.float64(r[i])
                     image[row, column, 1] += weight * np.float64(g[i])
                     image[row, column, 2] += weight * np.float64(b[i])
+
+
+@kernel
+def splat_weights(chosen: Chosen, x: F32, y: F32, first_row: int, table: F64, radius: np.float64, weights: F64, sums: F64) -> None:
+    """Add the weights of each chosen row, as ``splat_filter`` weighs it, to ``sums``, float64 (rows, width)."""
+    rows, width = sums.shape
+    reach = np.int64(2 * radius) + 1
+    for i in range(len(chosen)):
+        if not chosen[i]:
+            continue
+        film_x, film_y = np.float64(x[i]) - 0.5, np.float64(y[i]) - 0.5
+        first_x, first_y = np.int64(np.ceil(film_x - radius)), np.int64(np.ceil(film_y - radius))
+        for k in range(reach):
+            weights[k] = filter_weight(first_x + k - film_x, table, radius)
+        for j in range(reach):
+            row = first_y + j - first_row
+            weight_y = filter_weight(first_y + j - film_y, table, radius)
+            if row < 0 or row >= rows or weight_y == 0.0:
+                continue
+            for k in range(reach):
+                column = first_x + k
+                if column >= 0 and column < width:
+                    sums[row, column] += weight_y * weights[k]
+
+
+@kernel
+def walk_starts(walk: npt.NDArray[np.unsignedinteger], first: Chosen) -> None:
+    """Whether each row is the first of its walk, into ``first``: rows of a walk lie together."""
+    for i in range(len(walk)):
+        first[i] = i == 0 or walk[i] != walk[i - 1]

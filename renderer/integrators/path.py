@@ -11,6 +11,7 @@ from renderer.bsdfs.base import DIFFUSE
 from renderer.bsdfs.dispatch import eval_bsdf_lobe, load_bsdf, lobe_count, sample_bsdf
 from renderer.emitters.dispatch import emitted, pdf_direction, sample_direction, sky_pdf, sky_radiance
 from renderer.integrators.buffers import Counters, Lanes, PathRows, Rays, ShadowRays, VertexRows, WordRows
+from renderer.integrators.first_hit import seen_bsdf, seen_emission
 from renderer.integrators.rows import append_path, append_ray, append_shadow_ray, append_vertex, append_word, set_surface_point
 from renderer.kernel import kernel
 from renderer.math.hash import extend_word
@@ -185,7 +186,9 @@ def interact(
             weight = ONE
             if last_pdf > ZERO:
                 weight = power_heuristic(last_pdf, pdf_direction(emitters, geometry, emitter, o, d, t[i], cos_light, primitive))
-            c = scale(mul(beta, emitted(emitters, textures, emitter, hit.u, hit.v)), weight)
+            radiance = emitted(emitters, textures, emitter, hit.u, hit.v)
+            radiance = seen_emission(scene.ewa, scene, samples, lanes, lane, depth, primitive, hit, emitter, radiance)
+            c = scale(mul(beta, radiance), weight)
             if carries_light(c):
                 n_paths = append_path(paths, n_paths, lane, -1, EMITTER_HIT, depth, EMITTER, word, emitter, hit.p, c, weight)
 
@@ -203,6 +206,7 @@ def interact(
         elif material >= 0:
             numbers = walk_samples(samples, lanes.walk[lane])
             m = load_bsdf(scene.materials, textures, scene.families, material, hit.u, hit.v)
+            m = seen_bsdf(scene.ewa, scene, samples, lanes, lane, depth, primitive, hit, material, m)
 
             # ---- ask one emitter for light: one row for each lobe's share ----
             lobes = lobe_count(m)

@@ -13,7 +13,7 @@ import pyarrow as pa
 from renderer.integrators.buffers import NO_LANE, Lanes, PathRows, VertexRows, WordRows
 from renderer.kernel import kernel
 from renderer.settings import TraceSettings
-from renderer.tables import ARROW_TYPES, CAMERA_VERTICES, LIGHT_VERTICES, OCCLUDED, PATHS, WORDS, Table
+from renderer.tables import ARROW_TYPES, CAMERA_VERTICES, LIGHT_VERTICES, OCCLUDED, PATHS, UNLIT, WORDS, Table
 
 I64 = npt.NDArray[np.int64]
 
@@ -104,6 +104,19 @@ def fill_paths(rows: PathRows, n: int, lanes: Lanes, camera: bool, start: I64, p
         blocker[k] = rows.blocker[i]
 
 
+@kernel
+def fill_unlit(lanes: Lanes, n: int, start: I64, walk: Any, raster_x: Any, raster_y: Any) -> np.int64:
+    """The recorded walks, of ``n`` lanes, without a path of their own, into the columns: how many they are. ``start``: first path of each lane."""
+    k = 0
+    for lane in range(n):
+        if lanes.recorded[lane] and start[lane + 1] == start[lane]:
+            walk[k] = lanes.walk[lane]
+            raster_x[k] = lanes.raster[lane, 0]
+            raster_y[k] = lanes.raster[lane, 1]
+            k += 1
+    return np.int64(k)
+
+
 WordColumns = Sequence[npt.NDArray[Any]]
 """The columns word, parent, event and object of some words."""
 
@@ -163,6 +176,12 @@ class Recorder:
         fill_paths(rows, n, lanes, self.camera, self._start, self._position, columns[f"{side}_walk"], tuple(columns[name] for name in names))
         return self._batch(table.name, columns, total)
 
+    def unlit(self, lanes: Lanes, n_lanes: int) -> pa.RecordBatch:
+        """The recorded walks of which the last call of ``paths`` found no row, as a batch."""
+        columns = {name: self._column(UNLIT, name, n_lanes) for name in UNLIT.by_name}
+        total = int(fill_unlit(lanes, n_lanes, self._start, *columns.values()))
+        return self._batch(UNLIT.name, columns, total)
+
     def words(self, rows: list[WordColumns]) -> pa.RecordBatch:
         """All distinct words of the given columns, in order of the word. Raises WordCollision."""
         columns = [np.concatenate(parts) for parts in zip(*rows)] if rows else [np.zeros(0, t) for t in (np.uint64, np.uint64, np.uint8, np.uint16)]
@@ -202,6 +221,8 @@ def recorded_schemas(settings: TraceSettings) -> dict[str, pa.Schema]:
         PATHS.name: PATHS.schema(tuple(c.name for c in PATHS.columns if c.name not in skipped)),
         WORDS.name: WORDS.schema(tuple(c.name for c in WORDS.columns)),
     }
+    if camera:
+        tables[UNLIT.name] = UNLIT.schema(tuple(UNLIT.by_name))
     if settings.occluded:
         tables[OCCLUDED.name] = OCCLUDED.schema(tuple(c.name for c in OCCLUDED.columns if c.name not in skipped))
     if settings.keep == 0.0:

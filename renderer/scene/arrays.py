@@ -15,7 +15,7 @@ from renderer.bsdfs.base import Families, Materials
 from renderer.emitters.base import Emitters
 from renderer.sensors.base import Sensor
 from renderer.shapes.base import Geometry
-from renderer.textures.base import Textures
+from renderer.textures.base import Ewa, Textures
 
 F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
@@ -40,6 +40,7 @@ class SceneArrays(NamedTuple):
     textures: Textures | None
     emitters: Emitters
     sensor: Sensor
+    ewa: Ewa | None = None  # the filter over bitmaps that the camera sees; None: they are read at points
 
 
 @dataclass(frozen=True)

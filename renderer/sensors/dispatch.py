@@ -46,6 +46,14 @@ def refract_at_lens(focus: np.float32 | None, film: Vec3, lens: Vec3) -> Vec3:
 
 
 @kernel
+def at_focus(focus: np.float32 | None, a: Vec3) -> Vec3:
+    """A vector of the film plane, z = 1, as large as on the plane in focus; itself where the camera is a pinhole."""
+    if focus is None:
+        return a
+    return scale(a, focus)
+
+
+@kernel
 def focused(focus: np.float32 | None, local: Vec3, lens: Vec3) -> Vec3:
     """Where on the film plane (z = 1) light lands that comes from ``local`` (camera space) through ``lens``."""
     if focus is None:
@@ -71,6 +79,24 @@ def sample_ray(sensor: Sensor, x: np.float32, y: np.float32, u: np.float32, v: n
     d = rotate(sensor.to_world, local)
     o = add(translation(sensor.to_world), rotate(sensor.to_world, lens))
     return madd(d, sensor.near / local[2], o), d
+
+
+@kernel
+def film_ray(sensor: Sensor, x: np.float32, y: np.float32, lens: Vec3) -> tuple[Vec3, Vec3, Vec3, Vec3]:
+    """The world ray of film position (x, y) from a point of the lens (camera space): origin, direction, and its derivatives by x and by y.
+
+    The direction is not of unit length: it is linear in x and y, so its derivatives are the same all over the film (igehy1999).
+    """
+    film = (
+        sensor.tan_x * (ONE - TWO * (x / np.float32(sensor.width) + sensor.shift_x)),
+        sensor.tan_y * (ONE - TWO * (y / np.float32(sensor.height) + sensor.shift_y)),
+        ONE,
+    )
+    o = add(translation(sensor.to_world), rotate(sensor.to_world, lens))
+    d = rotate(sensor.to_world, sub(at_focus(sensor.focus, film), lens))
+    d_x = rotate(sensor.to_world, at_focus(sensor.focus, (-TWO * sensor.tan_x / np.float32(sensor.width), ZERO, ZERO)))
+    d_y = rotate(sensor.to_world, at_focus(sensor.focus, (ZERO, -TWO * sensor.tan_y / np.float32(sensor.height), ZERO)))
+    return o, d, d_x, d_y
 
 
 @kernel

@@ -28,6 +28,7 @@ from renderer.tables import (
     OCCLUDED,
     PATHS,
     TECHNIQUES,
+    UNLIT,
     WORDS,
     Table,
 )
@@ -175,6 +176,7 @@ def _add_walk(
     for depth, (event, thing) in enumerate(letters, start=1):
         place = dict.fromkeys(_PLACE, float(depth))
         tables.setdefault(vertices, []).append({"walk": walk, "depth": depth, "event": event, "object": thing, **place})
+    lit = len(run.rows)
     for path in range(generator.randrange(len(letters) + 2)):
         prefix = letters[:path]
         other = _letters(generator, generator.randrange(3)) if method == "both" else []
@@ -216,6 +218,8 @@ def _add_walk(
         (run.occluded if blocked else run.rows).append(row)
         (run.occluded_words if blocked else run.words).append(word)
         tables.setdefault("occluded" if blocked else "paths", []).append(row)
+    if method == "path" and len(run.rows) == lit:
+        tables.setdefault("unlit", []).append({"camera_walk": walk, "raster_x": raster[0], "raster_y": raster[1]})
 
 
 def _technique(generator: random.Random, method: str, prefix: list[Letter], other: list[Letter]) -> int:
@@ -241,7 +245,8 @@ def _recorded(known: dict[str, Any]) -> dict[str, Table]:
     if known["keep"] == 0:
         return {}
     vertices = LIGHT_VERTICES if known["method"] == "light" else CAMERA_VERTICES
-    return {vertices.name: vertices, "paths": PATHS} | ({"occluded": OCCLUDED} if known["occluded"] else {})
+    found = {vertices.name: vertices, "paths": PATHS} | ({"occluded": OCCLUDED} if known["occluded"] else {})
+    return found | ({"unlit": UNLIT} if known["method"] == "path" else {})
 
 
 def _stored_schema(table: Table, known: dict[str, Any]) -> pa.Schema:

@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from queries.errors import QueryError
-from viz.colors import MAPS, chrominance, color_map, distinct_colors, from_oklab, mapped, to_linear, to_srgb
+from queries.srgb import to_linear, to_srgb
+from viz.colors import MAPS, chrominance, color_map, distinct_colors, from_oklab, mapped
 
 
 @pytest.mark.parametrize("count", [1, 8, 20])

@@ -11,8 +11,8 @@ import pyvista
 import trimesh
 
 from queries.errors import QueryError
+from queries.srgb import to_linear
 from viz.bundles.polylines import polyline_mesh
-from viz.colors import to_linear
 from viz.exports import write_gltf, write_vtp
 
 SIZES = {5126: 4, 5125: 4, 5123: 2}

@@ -24,8 +24,8 @@ from queries.pixel_classes import NO_CLASS, SLOTS, WHOLE, pixel_classes
 from viz.report import Eye, Model, Picture, Shape, write_report
 from viz.report.model import scene_archive
 from viz.report.numbers import number, percent, with_error
+from viz.report.pages import slug
 from viz.report.pixels import cell_means, class_colors
-from viz.report.write import slug
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,9 @@
 
 import os
 import pathlib
-import re
 import shutil
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,33 +15,16 @@ from queries.pixel_classes import MOST_CELLS, PixelClasses, cell_size, pixel_cla
 from queries.run import Run
 from viz.report import sections
 from viz.report.model import Model, model_page
-from viz.report.numbers import number, percent, seconds, size
+from viz.report.pages import HERE, Copier, Shown, copy_static, environment, picture_size, slug
 from viz.report.picture import Picture, run_views
 from viz.report.pixels import class_colors, write_pixels
 from viz.report.sections import DrawClass
-from viz.report.tables import heading
+from viz.report.subpixel import subpixel_section
 
 F32 = npt.NDArray[np.float32]
 Answer = tuple[str, pa.Table | str]  # what it shows, and its table or why there is none
 MARK = "report.json"  # by which a folder is known for a report, which may be replaced
-_LARGEST_FILE = 40_000_000  # bytes, of what is copied: larger files stay in the run folder, and are named
 _STATIC = ("report.css", "report.js", "inspector.js")
-
-
-@dataclass(frozen=True)
-class Shown:
-    """A picture inside the report: ``file`` and ``links`` (label, file, size) are relative to its folder; ``left``: files that were too large."""
-
-    name: str
-    caption: str
-    alt: str
-    file: str
-    width: int
-    height: int
-    expression: str = ""
-    figures: Sequence[tuple[str, str]] = ()
-    links: Sequence[tuple[str, str, str]] = ()
-    left: Sequence[str] = field(default_factory=tuple)
 
 
 def write_report(
@@ -96,7 +77,7 @@ def _fill(
     threads: int | None,
 ) -> None:
     """Write everything into an empty folder."""
-    copier = _Copier(work, run)
+    copier = Copier(work)
     images = _images(run, copier)
     found = {**sections.answers(run), **further}
     pixels, colors = _write_inspector(work, run, images, threads)
@@ -123,6 +104,7 @@ def _fill(
             (replace(ranking, pictures=()), [(rank, copier.picture(picture, "class")) for rank, picture in ranking.pictures])
             for ranking in sections.rankings(run, draw, top)
         ],
+        "subpixel": subpixel_section(run, work),
         "diagnostics": sections.diagnostics(found, charts),
         "charts": charts,
         "settings": sections.settings_rows(run),
@@ -131,93 +113,15 @@ def _fill(
         "checksums": sections.checksums(run),
         "digest": sections.run_digest(run),
     }
-    environment = _environment()
-    (work / "index.html").write_text(environment.get_template("report.html.j2").render(page), "utf-8")
-    for name in _STATIC:
-        shutil.copyfile(_here() / "static" / name, work / name)
+    (work / "index.html").write_text(environment().get_template("report.html.j2").render(page), "utf-8")
+    copy_static(work, _STATIC)
     (work / MARK).write_text('{"report": "pathspace"}\n', "ascii")
-
-
-def _here() -> pathlib.Path:
-    return pathlib.Path(__file__).parent
-
-
-def _environment() -> Any:
-    """Templates, in which everything is escaped."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_here() / "templates"), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"number": number, "percent": percent, "seconds": seconds, "size": size, "slug": slug, "coded": coded}
-    return environment
-
-
-def coded(text: str) -> Any:
-    """Text whose parts in backticks are code; all of it escaped."""
-    import markupsafe
-
-    parts = [markupsafe.escape(part) for part in text.split("`")]
-    return markupsafe.Markup("").join(markupsafe.Markup("<code>{}</code>").format(part) if i % 2 else part for i, part in enumerate(parts))
 
 
 # --- pictures ------------------------------------------------------------------------------------------------------
 
 
-def slug(name: str) -> str:
-    """A name as a file name and as an anchor: letters, digits and hyphens."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "picture"
-
-
-class _Copier:
-    """Copies pictures into the report under names that are free."""
-
-    def __init__(self, work: pathlib.Path, run: Run) -> None:
-        self._work, self._run, self._taken = work, run, set[str]()
-
-    def copy(self, source: pathlib.Path, stem: str, folder: str = "pictures") -> str:
-        """Copy a file; where it lies now, relative to the report."""
-        name, count = f"{stem}{source.suffix.lower()}", 1
-        while name in self._taken:
-            count += 1
-            name = f"{stem}-{count}{source.suffix.lower()}"
-        self._taken.add(name)
-        (self._work / folder).mkdir(exist_ok=True)
-        try:
-            shutil.copyfile(source, self._work / folder / name)
-        except OSError as error:
-            raise QueryError(f"the picture `{source}` cannot be read ({error.strerror}): draw it again") from None
-        return f"{folder}/{name}"
-
-    def picture(self, picture: Picture, kind: str) -> Shown:
-        """Copy a picture and the files that belong to it."""
-        stem = f"{kind}-{slug(picture.name)}"
-        file = self.copy(picture.file, stem)
-        small = {key: path for key, path in picture.files.items() if path.stat().st_size <= _LARGEST_FILE}
-        stems = {key: f"{stem}-{slug(key)}" if path.suffix == ".png" else stem for key, path in small.items()}
-        links = [(key, self.copy(path, stems[key]), size(path.stat().st_size)) for key, path in small.items()]
-        left = [f"{path.name} ({size(path.stat().st_size)})" for key, path in picture.files.items() if key not in small]
-        figures = [(heading(key), number(value) if isinstance(value, (int, float)) else str(value)) for key, value in picture.figures.items()]
-        return Shown(picture.name, picture.caption, picture.alt, file, *_size(self._work / file), figures=figures, links=links, left=left)
-
-    def image(self, name: str, caption: str, alt: str, expression: str) -> Shown | None:
-        """Copy one of the run's images; None where it has no picture."""
-        source = self._run.path / "images" / f"{name}.png"
-        if not source.is_file():
-            return None
-        file = self.copy(source, slug(name), "images")
-        return Shown(name, caption, alt, file, *_size(self._work / file), expression=expression)
-
-
-def _size(file: pathlib.Path) -> tuple[int, int]:
-    """Width and height of a picture, pixels."""
-    from PIL import Image
-
-    with Image.open(file) as picture:
-        return picture.size
-
-
-def _images(run: Run, copier: _Copier) -> list[Shown]:
+def _images(run: Run, copier: Copier) -> list[Shown]:
     """The image and the AOVs, in the manifest's order, each with what it shows."""
     found: list[Shown | None] = []
     dialect = str((run.manifest.get("job") or {}).get("dialect") or "std")
@@ -226,11 +130,20 @@ def _images(run: Run, copier: _Copier) -> list[Shown]:
         expression = known.get("expression")
         if key == "beauty":
             alt = f"The rendered image of {name}, {run.settings['width']} by {run.settings['height']} pixels: all light."
-            found.insert(0, copier.image(key, "All light.", alt, ""))
+            found.insert(0, _image(run, copier, key, "All light.", alt, ""))
         elif expression:
             words = _described(run, expression, dialect)
-            found.append(copier.image(key, words, f"The image of the light that the expression {expression} selects: {words}", expression))
+            alt = f"The image of the light that the expression {expression} selects: {words}"
+            found.append(_image(run, copier, key, words, alt, expression))
     return [image for image in found if image is not None]
+
+
+def _image(run: Run, copier: Copier, name: str, caption: str, alt: str, expression: str) -> Shown | None:
+    """Copy one of the run's images; None where it has no picture."""
+    source = run.path / "images" / f"{name}.png"
+    if not source.is_file():
+        return None
+    return Shown(name, caption, alt, copier.copy(source, slug(name), "images"), *picture_size(source), expression=expression)
 
 
 def _described(run: Run, expression: str, dialect: str) -> str:
@@ -265,14 +178,14 @@ def _write_inspector(work: pathlib.Path, run: Run, images: Sequence[Shown], thre
     return found, colors
 
 
-def _write_models(work: pathlib.Path, run: Run, models: Sequence[Model], copier: _Copier) -> list[tuple[Model, str, Shown | None]]:
+def _write_models(work: pathlib.Path, run: Run, models: Sequence[Model], copier: Copier) -> list[tuple[Model, str, Shown | None]]:
     """Write a page for each model: the model, its page, and the picture that stands for it."""
     written = []
-    environment = _environment()
+    templates = environment()
     for model in models:
         page = f"view3d-{slug(model.name)}.html" if len(models) > 1 else "view3d.html"
-        frame = environment.get_template("view3d.html.j2").render(model=model, script=(_here() / "static" / "view3d.js").read_text("utf-8"))
-        title = str(environment.from_string("{{ title }}").render(title=f"{model.name}, in three dimensions"))
+        frame = templates.get_template("view3d.html.j2").render(model=model, script=(HERE / "static" / "view3d.js").read_text("utf-8"))
+        title = str(templates.from_string("{{ title }}").render(title=f"{model.name}, in three dimensions"))
         (work / page).write_text(model_page(model, title, frame), "utf-8")
         still = copier.picture(Picture(model.name, model.caption, model.alt, model.picture), "model") if model.picture else None
         written.append((model, page, still))

@@ -54,6 +54,8 @@ class Layout:
         width, height = self.cells
         if width < 1 or height < 1 or columns % width or rows % height:
             raise ValueError(f"{self.name}: a period of {columns} x {rows} positions holds no whole pixels of {width} x {height}")
+        if not np.isfinite(self.origin).all():
+            raise ValueError(f"{self.name}: expected a finite origin, found {self.origin}")
         if self.opponent.shape != (3, len(self.primaries)) or not np.isfinite(self.opponent).all():
             raise ValueError(f"{self.name}: expected an opponent matrix of 3 rows and {len(self.primaries)} finite columns")
         if len(self.extent) != len(self.primaries) or min(min(size) for size in self.extent) < 1:

@@ -62,7 +62,7 @@ def table(frequency: Sequence[float], weights: Sequence[Sequence[float]]) -> Sen
     Frequencies ascend, in cycles per degree; ``weights`` has as many values for each of Y', C1, C2.
     """
     f, w = np.asarray(frequency, np.float64), np.asarray(weights, np.float64)
-    if f.ndim != 1 or not len(f) or (np.diff(f) <= 0).any() or w.shape != (3, len(f)):
+    if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or (np.diff(f) <= 0).any() or w.shape != (3, len(f)):
         raise ValueError("expected ascending frequencies, and for each of three channels as many weights")
     return Sensitivity(f"table of {len(f)} frequencies", tuple(_table(f, row) for row in w))  # type: ignore[arg-type]
 
