@@ -19,7 +19,7 @@ def measure_subpixel(session: Session) -> SectionResult:
     with recorded(session, session.settings.passes) as folder:
         arguments = [str(folder.path), str(session.benchmark.threads), *asked.layouts]
         with Worker("pipeline.bench.subpixel_worker", arguments, session.logs / "subpixel.log") as worker:
-            work = {BOX: {}, DERIVE: {}} | {
+            work: dict[str, dict[str, str]] = {BOX: {}, DERIVE: {}} | {
                 _name(layout, method): {"layout": layout, "method": method} for layout in asked.layouts for method in asked.methods
             }
             contenders = {name: _ask(worker, what=name, **details) for name, details in work.items()}

@@ -10,7 +10,7 @@ from pipeline.bench.timing import timed
 from pipeline.bench.worker import serve
 from queries.images import image
 from queries.run import open_run
-from queries.subpixel.analyze import TARGET_SIZE, Derived, RunSource
+from queries.subpixel.analyze import F32, TARGET_SIZE, Derived, RunSource
 from queries.subpixel.description import SubpixelDescription, layout, shipped_layouts
 from queries.subpixel.display import fine_grid
 from queries.subpixel.evaluate import judge
@@ -51,7 +51,7 @@ def scores(displays: Mapping[str, Derived], methods: Sequence[str]) -> dict[str,
     asked = SubpixelDescription()
     layouts = {name: one.layout for name, one in displays.items()}
     fine = fine_grid(layouts.values())
-    pictures = {name: target(name, *TARGET_SIZE, fine) for name in asked.targets}
+    pictures: dict[str, F32] = {name: target(name, *TARGET_SIZE, fine) for name in asked.targets}
     kernels, fits = {name: one.kernels for name, one in displays.items()}, {name: one.fits for name, one in displays.items()}
     judged = judge(pictures, layouts, kernels, fits, asked.viewing, asked.sensitivity.sensitivity(), asked.zeros, fine, methods)
     means = judged.group_by(["layout", "method"]).aggregate([("scielab", "mean")]).to_pylist()

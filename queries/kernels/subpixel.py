@@ -1,14 +1,13 @@
 """Samples of a film to the subpixels of a display: weighted sums at the positions that hold a subpixel (thesis 4.4.1).
 
 Only those positions are kept, side by side: a row of ``sums`` holds one period's subpixels after the other, with room on both sides for what
-falls beside the film. ``sums``: float64 (rows, columns, 2) of one channel, its weighted sum and the weights', or (rows, columns, 4) of
-red, green, blue and the weights'. ``magnitudes``: float64 (rows, columns), the sums of the weights' magnitudes, or of no columns where weights
-have one sign.
+falls beside the film. ``sums``: float64 (2, rows, columns) of one channel, its weighted sum and the weights', or (4, rows, columns) of red, green,
+blue and the weights'.
 
 ``across``: float64 (patterns' rows, pixels of a period, phases, 2, reach), the weights of the subpixels that a sample reaches, by where in its
 pixel the sample lies: at a phase's start, and by how much they change to its end. ``first``: int64 (patterns' rows, pixels of a period),
-the first of these subpixels, counted from the first one of the pixel's period. ``channel``: int64 (patterns' rows, pixels of a period, reach), what
-each of them shows.
+the first of these subpixels, counted from the first one of the pixel's period. ``shows``: float64 (patterns' rows, pixels of a period, 3, reach), 1
+for the channel that each of them shows. Inner loops go along contiguous rows, so that they are compiled to vector instructions.
 """
 
 import numpy as np
@@ -19,95 +18,118 @@ from queries.kernel import kernel
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
-
-
-@kernel
-def phase_weights(table: F64, place: np.float64, weights: F64) -> None:
-    """The weights at ``place`` (0 … 1) in a pixel, of a table of (phases, 2, reach), linear within a phase."""
-    at = place * len(table)
-    phase = np.int64(at)
-    share = at - phase
-    for k in range(table.shape[2]):
-        weights[k] = table[phase, 0, k] + share * table[phase, 1, k]
-
-
-@kernel
-def add_weighted(sums: F64, magnitudes: F64, row: np.int64, start: np.int64, weights: F64, channel: I64, color: tuple[float, float, float]) -> None:
-    """Add one sample to the subpixels of a row from ``start`` on. ``channel``: what each shows."""
-    r, g, b = color
-    if sums.shape[2] == 4:
-        for k in range(len(weights)):
-            weight = weights[k]
-            sums[row, start + k, 0] += weight * r
-            sums[row, start + k, 1] += weight * g
-            sums[row, start + k, 2] += weight * b
-            sums[row, start + k, 3] += weight
-    else:
-        for k in range(len(weights)):
-            weight = weights[k]
-            value = r if channel[k] == 0 else g if channel[k] == 1 else b
-            sums[row, start + k, 0] += weight * value
-            sums[row, start + k, 1] += weight
-    if magnitudes.shape[1]:
-        for k in range(len(weights)):
-            magnitudes[row, start + k] += abs(weights[k])
+UNSIGNED = np.uint64
 
 
 @kernel
 def splat_rows(
-    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: int, across: F64, first: I64, channel: I64,
-    weights: F64, sums: F64, magnitudes: F64,
+    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, phases: int, across: F64, first: I64, shows: F64,
+    weights: F64, rows: int, columns: int, values: F64, totals: F64,
 ) -> None:  # fmt: skip
-    """Add samples to the subpixels of their own row of pixels. ``period``: subpixels of one period; ``weights``: scratch, ``reach`` entries."""
-    pixels = first.shape[1]
+    """Add samples to the subpixels of their own row of pixels, one channel each.
+
+    All arrays are flat, ``values`` and ``totals`` of ``rows`` rows of ``columns``: with indices that cannot be negative, this is half as fast again.
+    ``period``: subpixels of one period; ``weights``: scratch, ``reach`` entries.
+    """
+    pixels, turns, reach = np.uint32(len(first)), period[0], UNSIGNED(len(weights))
     for i in range(len(x)):
         if not (x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height):
             continue
         pixel, row = np.int64(x[i]), np.int64(y[i]) - first_row
-        if row < 0 or row >= len(sums):
+        if row < 0 or row >= rows:
             continue
-        phase_weights(across[0, pixel % pixels], np.float64(x[i]) - pixel, weights)
-        start = pad + pixel // pixels * period + first[0, pixel % pixels]
-        color = (np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2]))
-        add_weighted(sums, magnitudes, row, start, weights, channel[0, pixel % pixels], color)
+        turn = np.int64(np.uint32(pixel) // pixels)
+        column = UNSIGNED(pixel - turn * pixels)
+
+        # The weights of all subpixels in reach
+        at = (np.float64(x[i]) - pixel) * phases
+        phase = np.int64(at)
+        share = at - phase
+        start = (column * UNSIGNED(phases) + UNSIGNED(phase)) * UNSIGNED(2) * reach
+        change = start + reach
+        for k in range(reach):
+            weights[k] = across[start + k] + share * across[change + k]
+
+        # What each of them shows, and the weights
+        to = UNSIGNED(row * columns + pad + turn * turns + first[column])
+        red = column * UNSIGNED(3) * reach
+        green, blue = red + reach, red + UNSIGNED(2) * reach
+        r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
+        for k in range(reach):
+            values[to + k] += weights[k] * (r * shows[red + k] + g * shows[green + k] + b * shows[blue + k])
+        for k in range(reach):
+            totals[to + k] += weights[k]
 
 
 @kernel
 def splat_separable(
-    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, across: F64, first: I64, channel: I64, down: F64,
-    first_down: I64, down_of: I64, weights_across: F64, weights_down: F64, weights: F64, sums: F64, magnitudes: F64,
+    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, across: F64, first: I64, shows: F64, down: F64,
+    first_down: I64, down_of: I64, weights_across: F64, weights_down: F64, weights: F64, sums: F64,
 ) -> None:  # fmt: skip
     """Add samples to all subpixels in reach, by a weight across times a weight down.
 
     ``period``: subpixels of one period in each of the pattern's rows. ``down``: as ``across``, float64 (filters, pixels of a period, phases, 2,
     reach), for rows of positions; ``first_down``: the first row, counted from that of the pixel's period. ``down_of``: int64, shaped as
-    ``channel``, the filter down of each subpixel in reach.
+    ``first`` and reach, the filter down of each subpixel in reach.
     """
-    pixels, pixels_down, pattern_rows = first.shape[1], len(first_down), len(period)
+    pixels, pixels_down, pattern_rows, reach, rows = first.shape[1], len(first_down), len(period), len(weights), sums.shape[1]
     for i in range(len(x)):
         if not (x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height):
             continue
         pixel, line = np.int64(x[i]), np.int64(y[i])
-        column, color = pixel % pixels, (np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2]))
+        turn, turn_down = pixel // pixels, line // pixels_down
+        column, line_down = pixel - turn * pixels, line - turn_down * pixels_down
+        r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
+
+        # Weights down of all rows in reach, by each filter
+        at = (np.float64(y[i]) - line) * down.shape[2]
+        phase = np.int64(at)
+        share = at - phase
         for d in range(len(down)):
-            phase_weights(down[d, line % pixels_down], np.float64(y[i]) - line, weights_down[d])
-        top = line // pixels_down * pattern_rows + first_down[line % pixels_down]
+            for j in range(weights_down.shape[1]):
+                weights_down[d, j] = down[d, line_down, phase, 0, j] + share * down[d, line_down, phase, 1, j]
+        top = turn_down * pattern_rows + first_down[line_down]
+
+        # Weights across of each of the pattern's rows
+        at = (np.float64(x[i]) - pixel) * across.shape[2]
+        phase = np.int64(at)
+        share = at - phase
         for pattern_row in range(pattern_rows):
-            phase_weights(across[pattern_row, column], np.float64(x[i]) - pixel, weights_across)
-            start = pad + pixel // pixels * period[pattern_row] + first[pattern_row, column]
+            start, change = across[pattern_row, column, phase, 0], across[pattern_row, column, phase, 1]
+            for k in range(reach):
+                weights_across[k] = start[k] + share * change[k]
+            begin = pad + turn * period[pattern_row] + first[pattern_row, column]
+            end = begin + reach
+
+            # All rows of that kind
             for j in range((pattern_row - top) % pattern_rows, weights_down.shape[1], pattern_rows):
                 row = top + j - first_row
-                if row < 0 or row >= len(sums):
+                if row < 0 or row >= rows:
                     continue
-                for k in range(len(weights)):
-                    weights[k] = weights_across[k] * weights_down[down_of[pattern_row, column, k], j]
-                add_weighted(sums, magnitudes, row, start, weights, channel[pattern_row, column], color)
+                if len(down) == 1:
+                    scale = weights_down[0, j]
+                    for k in range(reach):
+                        weights[k] = scale * weights_across[k]
+                else:
+                    which = down_of[pattern_row, column]
+                    for k in range(reach):
+                        weights[k] = weights_across[k] * weights_down[which[k], j]
+                if len(sums) == 2:
+                    own = shows[pattern_row, column]
+                    values, red, green, blue = sums[0, row, begin:end], own[0], own[1], own[2]
+                    for k in range(reach):
+                        values[k] += weights[k] * (r * red[k] + g * green[k] + b * blue[k])
+                else:
+                    add_color(sums[0, row, begin:end], sums[1, row, begin:end], sums[2, row, begin:end], weights, r, g, b)
+                total = sums[len(sums) - 1, row, begin:end]
+                for k in range(reach):
+                    total[k] += weights[k]
 
 
 @kernel
 def splat_radial(
-    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, first: I64, channel: I64, subpixel: I64, center: F64,
-    first_down: I64, center_down: F64, table: F64, squared_radius: F64, weights: F64, sums: F64, magnitudes: F64,
+    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, first: I64, shows: F64, subpixel: I64, center: F64,
+    first_down: I64, center_down: F64, table: F64, squared_radius: F64, weights: F64, sums: F64,
 ) -> None:  # fmt: skip
     """Add samples to all subpixels in reach, by a weight of the distance.
 
@@ -115,19 +137,22 @@ def splat_radial(
     sample's pixel's left; ``center_down`` (pixels of a period, rows in reach), the same for rows. ``table``: float64 (subpixels, entries), weights
     by the distance's square, from 0 to ``squared_radius`` of each subpixel, linear in between.
     """
-    pixels, pixels_down, pattern_rows, last = first.shape[1], len(first_down), len(period), table.shape[1] - 1
+    pixels, pixels_down, pattern_rows, reach, rows = first.shape[1], len(first_down), len(period), len(weights), sums.shape[1]
+    last = table.shape[1] - 1
     for i in range(len(x)):
         if not (x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height):
             continue
         pixel, line = np.int64(x[i]), np.int64(y[i])
-        column, color = pixel % pixels, (np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2]))
-        top = line // pixels_down * pattern_rows + first_down[line % pixels_down]
+        turn, turn_down = pixel // pixels, line // pixels_down
+        column, line_down = pixel - turn * pixels, line - turn_down * pixels_down
+        r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
+        top = turn_down * pattern_rows + first_down[line_down]
         for j in range(center_down.shape[1]):
             row, pattern_row = top + j - first_row, (top + j) % pattern_rows
-            if row < 0 or row >= len(sums):
+            if row < 0 or row >= rows:
                 continue
-            offset_down = np.float64(y[i]) - line - center_down[line % pixels_down, j]
-            for k in range(len(weights)):
+            offset_down = np.float64(y[i]) - line - center_down[line_down, j]
+            for k in range(reach):
                 weights[k] = 0.0
                 which = subpixel[pattern_row, column, k]
                 if which >= 0:
@@ -136,8 +161,29 @@ def splat_radial(
                     if at < last:
                         n = np.int64(at)
                         weights[k] = table[which, n] + (at - n) * (table[which, n + 1] - table[which, n])
-            start = pad + pixel // pixels * period[pattern_row] + first[pattern_row, column]
-            add_weighted(sums, magnitudes, row, start, weights, channel[pattern_row, column], color)
+            begin = pad + turn * period[pattern_row] + first[pattern_row, column]
+            end = begin + reach
+            if len(sums) == 2:
+                own = shows[pattern_row, column]
+                values, red, green, blue = sums[0, row, begin:end], own[0], own[1], own[2]
+                for k in range(reach):
+                    values[k] += weights[k] * (r * red[k] + g * green[k] + b * blue[k])
+            else:
+                add_color(sums[0, row, begin:end], sums[1, row, begin:end], sums[2, row, begin:end], weights, r, g, b)
+            total = sums[len(sums) - 1, row, begin:end]
+            for k in range(reach):
+                total[k] += weights[k]
+
+
+@kernel
+def add_color(red: F64, green: F64, blue: F64, weights: F64, r: np.float64, g: np.float64, b: np.float64) -> None:
+    """Add a weighted color to as many values of each channel."""
+    for k in range(len(weights)):
+        red[k] += weights[k] * r
+    for k in range(len(weights)):
+        green[k] += weights[k] * g
+    for k in range(len(weights)):
+        blue[k] += weights[k] * b
 
 
 @kernel

@@ -27,24 +27,36 @@ def accumulate_samples(x: npt.NDArray[np.floating], y: npt.NDArray[np.floating],
     if not len(x) == len(y) == len(rgb) or rgb.shape != (len(x), 3):
         raise QueryError(f"expected as many x, y and colors, found {x.shape}, {y.shape} and {rgb.shape}")
     tables = weight_tables(filter, width, height)
-    sums, magnitudes = tables.allocate(tables.rows)
-    tables.splat(x, y, rgb, 0, sums, magnitudes)
-    lattice, weak = lattice_of(tables, sums, magnitudes)
-    if weak.any():
-        cells = np.zeros((height, width, 4))
-        add_to_cells(x, y, rgb, np.float64(1), np.float64(1), np.float64(0), np.float64(0), 0, True, cells)
-        stand_in(tables, lattice, weak, cell_means(cells))
+    sums = tables.allocate(tables.rows)
+    tables.splat(x, y, rgb, 0, sums)
+    cells = np.zeros((height, width, 4))
+    add_to_cells(x, y, rgb, np.float64(1), np.float64(1), np.float64(0), np.float64(0), 0, True, cells)
+    weak = suspects(tables, sums[-1], float(cells[..., 3].max()))
+    if weak.any() and tables.signed:
+        magnitudes = tables.magnitudes()
+        more = magnitudes.allocate(tables.rows)
+        magnitudes.splat(x, y, rgb, 0, more)
+        weak &= sums[-1] <= LEAST_SHARE * more[-1]
+    lattice, unknown = lattice_of(tables, sums, weak)
+    if unknown.any():
+        stand_in(tables, lattice, unknown, cell_means(cells))
     return lattice
 
 
-def lattice_of(tables: WeightTables, sums: F64, magnitudes: F64) -> tuple[F32, Bools]:
-    """Weighted means, float32 (rows, columns), and the subpixels that have none: too little weight, or weights that cancel."""
-    weight = sums[..., -1]
-    least = LEAST_SHARE * magnitudes if tables.signed else 0.0
-    safe = weight > least
-    means = sums[..., :-1] / np.where(safe, weight, 1.0)[..., None]
-    lattice = of_primaries(tables, [tables.to_lattice(means[..., c]) for c in range(means.shape[2])])
-    return lattice, (tables.to_lattice((~safe).astype(np.float64)) > 0) & active_positions(tables)
+def suspects(tables: WeightTables, weights: F64, samples: float) -> Bools:
+    """Where sums of weights, (rows, columns), may be too small: with up to ``samples`` samples in a pixel, others are large enough."""
+    weak, most = np.zeros(weights.shape, np.bool_), tables.most()
+    for row, largest in enumerate(most):
+        least = LEAST_SHARE * samples * largest if tables.signed else np.where(largest > 0, 0.0, -np.inf)
+        weak[row :: len(most)] = weights[row :: len(most)] <= least
+    return weak
+
+
+def lattice_of(tables: WeightTables, sums: F64, weak: Bools) -> tuple[F32, Bools]:
+    """Weighted means, float32 (rows, columns), and where subpixels have none. ``weak``: sums of which the weights say nothing, (rows, columns)."""
+    weights = np.where(weak | (sums[-1] == 0), 1.0, sums[-1])  # beside the display, there are none
+    lattice = of_primaries(tables, [tables.to_lattice(channel / weights) for channel in sums[:-1]])
+    return lattice, tables.to_lattice(weak.astype(np.float64)) > 0
 
 
 def of_primaries(tables: WeightTables, channels: list[F64]) -> F32:

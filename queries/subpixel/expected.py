@@ -22,10 +22,10 @@ def expected_weights(tables: WeightTables) -> F64:
     small = weight_tables(tables.filter, width, height)
     place = (np.arange(SIDE) + 0.5) / SIDE
     x, y = (np.add.outer(np.arange(size), place).ravel() for size in (width, height))
-    sums, magnitudes = small.allocate(small.rows)
+    sums = small.allocate(small.rows)
     for line in y:
-        small.splat(x, np.full(len(x), line), np.zeros((len(x), 3), np.float32), 0, sums, magnitudes)
-    weights = sums[..., -1] / SIDE**2
+        small.splat(x, np.full(len(x), line), np.zeros((len(x), 3), np.float32), 0, sums)
+    weights = sums[-1] / SIDE**2
     rows = (at[1][1][:, None] * len(layout.pattern) + np.arange(len(layout.pattern))).ravel()[: tables.rows]
     found = np.zeros((tables.rows, tables.columns))
     for row, count in enumerate(tables.period):

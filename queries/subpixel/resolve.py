@@ -18,7 +18,7 @@ from queries.kernels.subpixel import add_to_cells
 from queries.lpe import Expression
 from queries.run import Run
 from queries.shards import Piece, cores, map_shards
-from queries.subpixel.accumulate import Resolved, accumulate_samples, cell_means, lattice_of, stand_in
+from queries.subpixel.accumulate import LEAST_SHARE, Resolved, accumulate_samples, cell_means, lattice_of, stand_in, suspects
 from queries.subpixel.expected import expected_weights
 from queries.subpixel.samples import SampledRun, sampled
 from queries.subpixel.weights import WeightTables, weight_tables
@@ -43,38 +43,52 @@ def resolve(
     with Opened(run, threads) as opened:
         source, threads = sampled(opened, expression), threads or opened.threads or cores()
         tables = weight_tables(filter, opened.settings["width"], opened.settings["height"])
-        sums, magnitudes = tables.allocate(tables.rows)
-        work = functools.partial(_resolve_shard, source, tables)
-        for first, part, more in map_shards(opened.files(*source.tables), work, threads):
-            sums[first : first + len(part)] += part
-            magnitudes[first : first + len(more)] += more
-        if not source.camera:
-            sums[..., -1] = expected_weights(tables) * source.expected
-        lattice, weak = lattice_of(tables, sums, magnitudes)
-        if weak.any():
-            stand_in(tables, lattice, weak, grid(opened, 1, 1, expression, threads))
-        return Resolved(lattice, int(np.count_nonzero(weak)))
+        sums = _sum(source, tables, threads)
+        if source.camera:
+            weak = suspects(tables, sums[-1], opened.settings["passes"])
+            if weak.any() and tables.signed:
+                weak &= sums[-1] <= LEAST_SHARE * _sum(sampled(opened, None), tables.magnitudes(), threads, weak.any(axis=1))[-1]
+        else:
+            sums[-1] = expected_weights(tables) * source.expected
+            weak = sums[-1] <= 0
+        lattice, unknown = lattice_of(tables, sums, weak)
+        if unknown.any():
+            stand_in(tables, lattice, unknown, grid(opened, 1, 1, expression, threads))
+        return Resolved(lattice, int(np.count_nonzero(unknown)))
 
 
-def _resolve_shard(source: SampledRun, tables: WeightTables, found: Iterator[Piece]) -> tuple[int, F64, F64]:
-    """What one shard adds: its first row of positions, sums and sums of magnitudes from there on."""
+def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDArray[np.bool_] | None = None) -> F64:
+    """Sums of all samples. ``wanted``: rows of positions, bool; of others, some samples may be left out."""
+    sums = tables.allocate(tables.rows)
+    work = functools.partial(_sum_shard, source, tables, wanted)
+    for first, part in map_shards(source.run.files(*source.tables), work, threads):
+        sums[:, first : first + part.shape[1]] += part
+    return sums
+
+
+def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.bool_] | None, found: Iterator[Piece]) -> tuple[int, F64]:
+    """What one shard adds: its first row of positions, and sums from there on."""
     there = list(found)
-    spans = [source.heights(piece) for piece in there] if source.banded else []
-    first, last = tables.band(min(low for low, _ in spans), max(high for _, high in spans)) if source.banded else (0, tables.rows)
-    sums, magnitudes = tables.allocate(last - first)
-    beside = None
+    first, last = 0, tables.rows
+    if source.banded:
+        bands = [tables.band(*source.heights(piece)) for piece in there]
+        if wanted is not None:
+            kept = [i for i, band in enumerate(bands) if wanted[slice(*band)].any()]
+            there, bands = [there[i] for i in kept], [bands[i] for i in kept]
+        first, last = min((low for low, _ in bands), default=0), max((high for _, high in bands), default=0)
+    sums, beside = tables.allocate(last - first), None
     while there:
         piece = there.pop(0)
         for samples in source.of(piece):
             if samples.counted or not source.camera:
-                tables.splat(samples.x, samples.y, samples.color, first, sums, magnitudes)
+                tables.splat(samples.x, samples.y, samples.color, first, sums)
             else:
-                beside = beside or tables.allocate(last - first)
-                tables.splat(samples.x, samples.y, samples.color, first, *beside)
+                beside = tables.allocate(last - first) if beside is None else beside
+                tables.splat(samples.x, samples.y, samples.color, first, beside)
         piece.forget()
-    if beside:
-        sums[..., :-1] += beside[0][..., :-1]
-    return first, sums, magnitudes
+    if beside is not None:
+        sums[:-1] += beside[:-1]
+    return first, sums
 
 
 def grid(

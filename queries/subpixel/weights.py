@@ -1,7 +1,8 @@
 """A subpixel filter as tables for kernels: which subpixels a sample reaches from where it lies in its pixel, and with what weights."""
 
+import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ I64 = npt.NDArray[np.int64]
 PHASES = 512  # of a pixel, at least: linear in between, weights of the optimal filter are off by less than 1e-5 of the largest
 DISTANCES = 4096  # entries of a table by the distance's square
 _BESIDE = 1e-9  # pixels: weights are taken so far inside of a phase, so that a box that ends at one is exact
+_PLACES, _ABOVE = 24, 1.05  # places in a pixel along each axis where weights are looked at, and what is added for those between
 _VECTOR = 4  # subpixels in reach are rounded up to this
 
 
@@ -74,24 +76,40 @@ class WeightTables:
         last = np.clip((int(high) // pixels + 1) * period + self.rows_reached, first, self.rows)
         return int(first), int(last)
 
-    def allocate(self, rows: int) -> tuple[F64, F64]:
-        """Sums of so many rows of positions, and of their weights' magnitudes."""
-        return np.zeros((rows, self.columns, self.channels)), np.zeros((rows, self.columns if self.signed else 0))
+    def allocate(self, rows: int) -> F64:
+        """Sums of so many rows of positions."""
+        return np.zeros((self.channels, rows, self.columns))
 
-    def bytes(self, rows: int) -> int:
-        """How large these are."""
-        return 8 * rows * self.columns * (self.channels + self.signed)
+    def magnitudes(self) -> "WeightTables":
+        """The tables of the weights' magnitudes."""
+        across = tuple(_magnitude(one) for one in self.filter.across)
+        down = None if self.filter.down is None else tuple(_magnitude(one) for one in self.filter.down)
+        return weight_tables(dataclasses.replace(self.filter, across=across, down=down), self.width, self.height)
+
+    def most(self) -> F64:
+        """More than the sum of the weights' magnitudes can be with one sample in each pixel, by the pattern's row: float64 (rows, columns of sums).
+
+        -inf beside the display.
+        """
+        found, largest = np.full((len(self.period), self.columns), -np.inf), _largest(self.filter)
+        for which, (row, k, column) in enumerate(self._places()):
+            count = len(range(column, self.width * self.layout.cells[0], self.layout.pattern.shape[1]))
+            found[row, self.pad + k :: self.period[row]][:count] = largest[which]
+        return found
 
     def to_lattice(self, values: F64) -> F64:
         """Values of subpixels, (rows, columns) of sums, to positions: float64 (rows, columns); 0 where there is no subpixel."""
-        layout, (pattern_rows, pattern_columns) = self.layout, self.layout.pattern.shape
-        lattice = np.zeros((self.rows, self.width * layout.cells[0]))
-        for row in range(pattern_rows):
-            columns = layout.active[layout.active[:, 0] == row, 1]
-            for k, column in enumerate(columns):
-                place = lattice[row::pattern_rows, column::pattern_columns]
-                place[:] = values[row::pattern_rows, self.pad + k :: len(columns)][:, : place.shape[1]]
+        pattern_rows, pattern_columns = self.layout.pattern.shape
+        lattice = np.zeros((self.rows, self.width * self.layout.cells[0]))
+        for row, k, column in self._places():
+            place = lattice[row::pattern_rows, column::pattern_columns]
+            place[:] = values[row::pattern_rows, self.pad + k :: self.period[row]][:, : place.shape[1]]
         return lattice
+
+    def _places(self) -> Iterator[tuple[int, int, int]]:
+        """Of each subpixel of a period: its row, which one it is there, and its column."""
+        for row, column in self.layout.active.tolist():
+            yield row, int(np.count_nonzero(self.layout.pattern[row, :column] >= 0)), column
 
 
 def weight_tables(filter: SubpixelFilter, width: int, height: int) -> WeightTables:
@@ -103,7 +121,7 @@ def weight_tables(filter: SubpixelFilter, width: int, height: int) -> WeightTabl
     columns = 2 * pad + int(period.max()) * -(-width * layout.cells[0] // layout.pattern.shape[1])
     make = _radial if filter.down is None else _rows if _own_row(filter) else _separable
     added = make(filter, reach, first_down, center_down)
-    splat = functools.partial(_splat, added, (width, height), pad, int(period[0]) if make is _rows else period)
+    splat = functools.partial(_splat, added, (width, height), pad, period)
     return WeightTables(filter, width, height, pad, period, columns, added.signed, center_down.shape[1], splat)
 
 
@@ -117,12 +135,12 @@ class _Added:
     signed: bool
 
 
-def _splat(
-    added: _Added, size: tuple[int, int], pad: int, period: int | I64, x: Floats, y: Floats, rgb: F32, first_row: int, sums: F64, magnitudes: F64
-) -> None:
+def _splat(added: _Added, size: tuple[int, int], pad: int, period: I64, x: Floats, y: Floats, rgb: F32, first_row: int, sums: F64) -> None:
     """Add samples, at ``x`` and ``y`` in pixels and of colors (samples, 3), to sums of the rows of positions from ``first_row`` on."""
     scratch = [np.empty_like(one) for one in added.scratch]
-    added.kernel(*(_read_only(one) for one in (x, y, rgb)), *size, first_row, pad, period, *added.tables, *scratch, sums, magnitudes)
+    samples = (_read_only(one) for one in (x, y, rgb))
+    shown = (*sums.shape[1:], sums[0].ravel(), sums[1].ravel()) if added.kernel is splat_rows else (sums,)
+    added.kernel(*samples, *size, first_row, pad, period, *added.tables, *scratch, *shown)
 
 
 def _read_only(values: Floats) -> Floats:
@@ -135,7 +153,8 @@ def _read_only(values: Floats) -> Floats:
 def _rows(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:
     """Weights across alone."""
     across = _across_table(filter, reach)
-    return _Added(splat_rows, (across, reach.first, _channels(filter, reach)), (np.zeros(across.shape[-1]),), bool((across[..., 0, :] < 0).any()))
+    tables = (across.shape[2], across.ravel(), reach.first.ravel(), _shows(filter, reach).ravel())
+    return _Added(splat_rows, tables, (np.zeros(across.shape[-1]),), bool((across[..., 0, :] < 0).any()))
 
 
 def _separable(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:
@@ -146,7 +165,7 @@ def _separable(filter: SubpixelFilter, reach: Reach, first_down: I64, center_dow
     down = np.stack([_phase_table(center_down, filter.layout.cells[1], functools.partial(_inside, one)) for one in different])
     scratch = (np.zeros(across.shape[-1]), np.zeros((len(different), center_down.shape[1])), np.zeros(across.shape[-1]))
     signed = bool((across[..., 0, :] < 0).any() or (down[..., 0, :] < 0).any())
-    return _Added(splat_separable, (across, reach.first, _channels(filter, reach), down, first_down, down_of), scratch, signed)
+    return _Added(splat_separable, (across, reach.first, _shows(filter, reach), down, first_down, down_of), scratch, signed)
 
 
 def _radial(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:
@@ -154,21 +173,47 @@ def _radial(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: 
     squared_radius = np.array([one.radius**2 for one in filter.across])
     distance = np.sqrt(np.linspace(0.0, 1.0, DISTANCES + 1)) * (1.0 - _BESIDE)
     table = np.array([_inside(one, distance * one.radius) for one in filter.across])
-    tables = (reach.first, _channels(filter, reach), reach.subpixel, reach.center, first_down, center_down, table, squared_radius)
+    tables = (reach.first, _shows(filter, reach), reach.subpixel, reach.center, first_down, center_down, table, squared_radius)
     return _Added(splat_radial, tables, (np.zeros(reach.subpixel.shape[2]),), bool((table < 0).any()))
 
 
-def _channels(filter: SubpixelFilter, reach: Reach) -> I64:
-    """The channel that each subpixel in reach shows; of no meaning where primaries mix channels."""
-    return np.where(reach.subpixel >= 0, np.minimum(filter.layout.active_primaries[reach.subpixel], 2), 0)
+def _shows(filter: SubpixelFilter, reach: Reach) -> F64:
+    """1 for the channel that each subpixel in reach shows, (pattern rows, pixels, 3, reach); of no meaning where primaries mix channels."""
+    primary = np.where(reach.subpixel >= 0, filter.layout.active_primaries[reach.subpixel], -1)
+    return np.ascontiguousarray(primary[:, :, None, :] == np.arange(3)[:, None], np.float64)
+
+
+def _magnitude(filter: ReconstructionFilter) -> ReconstructionFilter:
+    """The magnitude of a filter."""
+    return dataclasses.replace(filter, weight=lambda x: np.abs(filter.weight(x)))
+
+
+def _largest(filter: SubpixelFilter) -> F64:
+    """For each subpixel, the sum over pixels of the largest magnitude of a weight within, and a little more: float64 (subpixels)."""
+    reach = [int(np.ceil(radius)) + 1 for radius in filter.radius]
+    place = [np.arange(-n * _PLACES, (n + 1) * _PLACES + 1) / _PLACES for n in reach]
+    found = []
+    for which, (x, y) in enumerate(filter.centers() % 1.0):
+        across, down = place[0] - x, place[1] - y
+        if filter.down is None:
+            weights = _inside(filter.across[which], np.hypot(down[:, None], across))
+        else:
+            weights = np.multiply.outer(_inside(filter.down[which], down), _inside(filter.across[which], across))
+        inner = np.abs(weights)
+        for axis in (0, 1):  # both ends of a pixel belong to it
+            pixels = (inner.shape[axis] - 1) // _PLACES
+            spans = [inner.take(range(n * _PLACES, (n + 1) * _PLACES + 1), axis).max(axis) for n in range(pixels)]
+            inner = np.stack(spans, axis)
+        found.append(_ABOVE * inner.sum())
+    return np.array(found)
 
 
 def _own_row(filter: SubpixelFilter) -> bool:
-    """Whether every subpixel takes just the samples of its own row of pixels."""
+    """Whether every subpixel takes just the samples of its own row of pixels, and one channel of them."""
     layout = filter.layout
     at = np.linspace(-0.499, 0.499, 9)
     boxes = filter.down is not None and all(one.radius == 0.5 and np.ptp(one.weight(at)) == 0.0 for one in filter.down)
-    return boxes and layout.one_dimensional and layout.cells[1] == 1 and (filter.at_pixel or layout.origin[1] == 0.5)
+    return boxes and len(layout.primaries) == 3 and layout.one_dimensional and layout.cells[1] == 1 and (filter.at_pixel or layout.origin[1] == 0.5)
 
 
 def _inside(filter: ReconstructionFilter, offset: F64) -> F64:

@@ -50,7 +50,8 @@ class Ewa(NamedTuple):
     reach: npt.NDArray[np.float32]  # (2,) where the tables of ``across`` and ``down`` end
     box: npt.NDArray[np.float32]  # (4,) what all filters of a pixel cover: left, top, right, bottom of its center
     centers: npt.NDArray[np.float32] | None  # (rows, columns, 3, 2) right of and below the pixel's center: R, G and B of each pixel of a period
-    filter: npt.NDArray[np.int32]  # (rows, columns, 3) whose table; without ``centers``, all three are row 0's
+    filter: npt.NDArray[np.int32]  # (rows, columns, 3) which row of ``across``; without ``centers``, all three are row 0's
+    filter_down: npt.NDArray[np.int32]  # (rows, columns, 3) which row of ``down``
     step: Any  # float32, how large a cell of the texture may be, pixels
     pyramid: Pyramid
     memory: Memory | None

@@ -25,7 +25,7 @@ F32 = npt.NDArray[np.float32]
 I32 = npt.NDArray[np.int32]
 Plane = tuple[Any, Any, Any, Any]  # four float32 of a 2 x 2 matrix, by row
 
-MOST_CELLS = np.float32(2048)
+MOST_CELLS = np.float32(1024)
 DEEPEST = np.float32(24)  # cells are never smaller than 2^-24 texels
 LEAST_SHADOW = np.float32(1 / 64)  # pixels: narrower integrals would drown in the rounding of their tables
 LEAST_AREA = np.float32(1e-12)  # squared texels of a pixel: smaller ones have no inverse in float32
@@ -105,6 +105,16 @@ class Cell(NamedTuple):
     per_y: Any
 
 
+class Three(NamedTuple):
+    """The filters of a pixel's three subpixels."""
+
+    across: tuple[Any, Any, Any]  # int32, which table
+    down: tuple[Any, Any, Any]
+    x: Vec3  # right of the pixel's center, pixels
+    y: Vec3
+    level: Any  # bool: they agree down
+
+
 @kernel
 def tabulated(table: F32, k: Index, at: np.float32) -> np.float32:
     """Row k of a table at ``at`` >= 0, in entries, linear in between, its last entry beyond."""
@@ -119,38 +129,76 @@ def tabulated(table: F32, k: Index, at: np.float32) -> np.float32:
 @kernel
 def integral(table: F32, k: Index, low: np.float32, high: np.float32) -> np.float32:
     """The integral of an even filter between two places, in entries, by its running integral from 0."""
-    below = np.float32(np.copysign(tabulated(table, k, abs(low)), low))
-    return np.float32(np.float32(np.copysign(tabulated(table, k, abs(high)), high)) - below)
+    below = tabulated(table, k, low) if low >= ZERO else -tabulated(table, k, -low)
+    above = tabulated(table, k, high) if high >= ZERO else -tabulated(table, k, -high)
+    return np.float32(above - below)
 
 
 @kernel
-def weight_at(down: F32 | None, across: F32, k: Index, dx: np.float32, dy: np.float32, cell: Cell) -> np.float32:
-    """Filter k of a cell at (dx, dy) from the filter's center, pixels, up to scale."""
+def round_weight(across: F32, k: Index, dx: np.float32, dy: np.float32, cell: Cell) -> np.float32:
+    """Round filter k at (dx, dy) from its center, pixels; cells that are too large widen it."""
+    last = np.float32(across.shape[1] - 1)
+    reach = last / cell.per_x
+    x = dx / (reach + cell.rim_x)
+    y = dy / (reach + cell.rim_y)
+    return tabulated(across, k, np.sqrt(x * x + y * y) * last)
+
+
+@kernel
+def weights_of_one(down: F32 | None, across: F32, dx: np.float32, dy: np.float32, cell: Cell) -> Vec3:
+    """The same weight in R, G and B, for a cell at (dx, dy) from the pixel's center."""
     if down is None:
-        reach = np.float32(across.shape[1] - 1) / cell.per_x
-        x = dx / (reach + cell.rim_x)
-        y = dy / (reach + cell.rim_y)
-        return tabulated(across, k, np.sqrt(x * x + y * y) * np.float32(across.shape[1] - 1))
-    weight = integral(down, k, (dy - cell.half_y) * cell.per_y, (dy + cell.half_y) * cell.per_y)
-    if weight == ZERO:
-        return ZERO
-    return weight * integral(across, k, (dx - cell.half_x) * cell.per_x, (dx + cell.half_x) * cell.per_x)
+        w = round_weight(across, 0, dx, dy, cell)
+        return (w, w, w)
+    w = integral(down, 0, (dy - cell.half_y) * cell.per_y, (dy + cell.half_y) * cell.per_y)
+    w *= integral(across, 0, (dx - cell.half_x) * cell.per_x, (dx + cell.half_x) * cell.per_x)
+    return (w, w, w)
 
 
 @kernel
-def weights_at(
-    centers: F32 | None, down: F32 | None, across: F32, kind: I32, row: Index, column: Index, dx: np.float32, dy: np.float32, cell: Cell
-) -> Vec3:
-    """The weights of a cell at (dx, dy) from the pixel's center in R, G and B; the pixel stands at (row, column) of a period."""
-    if centers is None:
-        w = weight_at(down, across, 0, dx, dy, cell)
-        return (w, w, w)
-    c = centers
+def weights_of_three(down: F32 | None, across: F32, three: Three, dx: np.float32, dy: np.float32, cell: Cell) -> Vec3:
+    """The weights in R, G and B of a cell at (dx, dy) from the pixel's center."""
+    a, x, y = three.across, three.x, three.y
+    if down is None:
+        return (
+            round_weight(across, a[0], dx - x[0], dy - y[0], cell),
+            round_weight(across, a[1], dx - x[1], dy - y[1], cell),
+            round_weight(across, a[2], dx - x[2], dy - y[2], cell),
+        )
+    low, high = (dy - cell.half_y) * cell.per_y, (dy + cell.half_y) * cell.per_y
+    r = integral(down, three.down[0], low - y[0] * cell.per_y, high - y[0] * cell.per_y)
+    g, b = r, r
+    if not three.level:
+        g = integral(down, three.down[1], low - y[1] * cell.per_y, high - y[1] * cell.per_y)
+        b = integral(down, three.down[2], low - y[2] * cell.per_y, high - y[2] * cell.per_y)
+    low, high = (dx - cell.half_x) * cell.per_x, (dx + cell.half_x) * cell.per_x
     return (
-        weight_at(down, across, kind[row, column, 0], dx - c[row, column, 0, 0], dy - c[row, column, 0, 1], cell),
-        weight_at(down, across, kind[row, column, 1], dx - c[row, column, 1, 0], dy - c[row, column, 1, 1], cell),
-        weight_at(down, across, kind[row, column, 2], dx - c[row, column, 2, 0], dy - c[row, column, 2, 1], cell),
+        r * integral(across, a[0], low - x[0] * cell.per_x, high - x[0] * cell.per_x),
+        g * integral(across, a[1], low - x[1] * cell.per_x, high - x[1] * cell.per_x),
+        b * integral(across, a[2], low - x[2] * cell.per_x, high - x[2] * cell.per_x),
     )
+
+
+@kernel
+def three_of(centers: F32 | None, ewa: Ewa, row: Index, column: Index) -> Three | None:
+    """The filters of the pixel at (row, column) of a period of the display."""
+    if centers is None:
+        return None
+    a, d, c = ewa.filter, ewa.filter_down, centers
+    across = (a[row, column, 0], a[row, column, 1], a[row, column, 2])
+    down = (d[row, column, 0], d[row, column, 1], d[row, column, 2])
+    x = (c[row, column, 0, 0], c[row, column, 1, 0], c[row, column, 2, 0])
+    y = (c[row, column, 0, 1], c[row, column, 1, 1], c[row, column, 2, 1])
+    level = y[0] == y[1] and y[1] == y[2] and down[0] == down[1] and down[1] == down[2]
+    return Three(across, down, x, y, level)
+
+
+@kernel
+def weights_at(three: Three | None, down: F32 | None, across: F32, dx: np.float32, dy: np.float32, cell: Cell) -> Vec3:
+    """The weights in R, G and B of a cell at (dx, dy) from the pixel's center, up to scale."""
+    if three is None:
+        return weights_of_one(down, across, dx, dy, cell)
+    return weights_of_three(down, across, three, dx, dy, cell)
 
 
 @kernel
@@ -193,8 +241,8 @@ def cell_size(n: np.float32, level: Index, size: Index, level_size: Index) -> np
 
 
 @kernel
-def choose_cells(ewa: Ewa, index: Index, j: Plane, determinant: np.float32) -> tuple[int, np.float32, np.float32, np.float32]:
-    """Level and size of cells, in texels along both axes, and how many there will be, for a Jacobian in texels per pixel.
+def choose_cells(ewa: Ewa, index: Index, j: Plane, determinant: np.float32) -> tuple[int, np.float32, np.float32, np.float32, Cell]:
+    """Level and size of cells, in texels along both axes, about how many there will be, and how they look, for a Jacobian in texels per pixel.
 
     The smaller extent decides the level, so an elongated footprint meets many texels; where there are too many, both extents grow.
     """
@@ -202,14 +250,16 @@ def choose_cells(ewa: Ewa, index: Index, j: Plane, determinant: np.float32) -> t
     top = int(pyramid.top[index])
     n_s = exponent(ewa.step, np.sqrt(j[2] * j[2] + j[3] * j[3]) / abs(determinant))
     n_t = exponent(ewa.step, np.sqrt(j[0] * j[0] + j[1] * j[1]) / abs(determinant))
-    width, height = ewa.box[2] - ewa.box[0], ewa.box[3] - ewa.box[1]
     level, size_s, size_t, count = 0, ONE, ONE, ZERO
+    cell = cell_on_film(ewa, j, determinant, size_s, size_t)
     for _ in range(64):
         level = int(min(max(min(n_s, n_t), ZERO), np.float32(top)))
         size_s = cell_size(n_s, level, pyramid.size[index, 0, 0], pyramid.size[index, level, 0])
         size_t = cell_size(n_t, level, pyramid.size[index, 0, 1], pyramid.size[index, level, 1])
 
-        # What the filter covers, and a rim of a cell
+        # What the filter covers, and a cell more on each side
+        cell = cell_on_film(ewa, j, determinant, size_s, size_t)
+        width, height = ewa.box[2] - ewa.box[0] + TWO * cell.rim_x, ewa.box[3] - ewa.box[1] + TWO * cell.rim_y
         across = (abs(j[0]) * width + abs(j[1]) * height) / size_s
         down = (abs(j[2]) * width + abs(j[3]) * height) / size_t
         count = np.float32(width * height * abs(determinant) / (size_s * size_t) + TWO * (across + down) + FOUR)
@@ -217,7 +267,7 @@ def choose_cells(ewa: Ewa, index: Index, j: Plane, determinant: np.float32) -> t
             break
         n_s += ONE
         n_t += ONE
-    return level, size_s, size_t, count
+    return level, size_s, size_t, count, cell
 
 
 @kernel
@@ -247,18 +297,17 @@ def average(ewa: Ewa, textures: Textures, index: Index, s: np.float32, t: np.flo
     ``row`` and ``column`` are the pixel's within a period of the display. Where weights cancel, it is the color at (s, t) itself.
     """
     determinant = j[0] * j[3] - j[1] * j[2]
-    level, size_s, size_t, count = choose_cells(ewa, index, j, determinant)
+    level, size_s, size_t, count, cell = choose_cells(ewa, index, j, determinant)
     image = level_of(ewa, textures, index, level)
     if not count <= MOST_CELLS:
         return texel(image, 0, 0)  # of a single pixel, which the footprint holds many times over
     mode = textures.mode[index, 0]
     parts = level == 0 and (size_s < ONE or size_t < ONE)
-    centers, down, across, kind = ewa.centers, ewa.down, ewa.across, ewa.filter
+    down, across, three = ewa.down, ewa.across, three_of(ewa.centers, ewa, row, column)
     s = s / size_s
     t = t / size_t
 
     # What the filters cover on the film, and the box around it in cells: of a parallelogram
-    cell = cell_on_film(ewa, j, determinant, size_s, size_t)
     left, right = ewa.box[0] - cell.rim_x, ewa.box[2] + cell.rim_x
     top, bottom = ewa.box[1] - cell.rim_y, ewa.box[3] + cell.rim_y
     leftmost, rightmost = extremes(j[0] / size_s, j[1] / size_s, left, right, top, bottom)
@@ -274,7 +323,7 @@ def average(ewa: Ewa, textures: Textures, index: Index, s: np.float32, t: np.flo
         first, last = part_of_row(first, last, cell.y_s, cell.y_t * q, top, bottom)
         for x in range(int(np.ceil(s + first - HALF)), int(np.floor(s + last - HALF)) + 1):
             p = np.float32(x) + HALF - s
-            w = weights_at(centers, down, across, kind, row, column, cell.x_s * p + cell.x_t * q, cell.y_s * p + cell.y_t * q, cell)
+            w = weights_at(three, down, across, cell.x_s * p + cell.x_t * q, cell.y_s * p + cell.y_t * q, cell)
             if parts:
                 c = between_texels(image, mode, (np.float32(x) + HALF) * size_s, (np.float32(y) + HALF) * size_t)
             else:

@@ -1,5 +1,6 @@
 """Filters of pixels and subpixels as the tables that the elliptical weighted average reads, and scenes that have one."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ I64 = npt.NDArray[np.int64]
 DEVIATION = 0.5  # of the Gaussian of a pixel, pixels
 GAUSSIAN_REACH = 3 * DEVIATION  # where it ends, lowered so that it ends at zero
 PIXEL_STEP = 1 / 4  # how large a cell of the texture may be, pixels: half the Gaussian's deviation
-SUBPIXEL_STEP = 1 / 6  # half a subpixel of a stripe
+SUBPIXEL_STEP = 1 / 5  # rather more than half a subpixel of a stripe
 ENTRIES = 1024  # of a table
 PARTS = 16  # of an entry, for its integral
 MOST_SLOTS = 1 << 22  # pixels that a tracer remembers
@@ -40,6 +41,12 @@ def by_distance(filter: ReconstructionFilter, reach: float) -> F32:
     """A filter at ``ENTRIES`` + 1 distances up to ``reach`` pixels."""
     x = np.linspace(0.0, reach, ENTRIES + 1)
     return np.where(x <= filter.radius, filter.weight(x), 0.0).astype(np.float32)
+
+
+def distinct(tables: Sequence[F32]) -> tuple[F32, npt.NDArray[np.int32]]:
+    """Equal tables once, (filters, entries), and which of them each was, int32."""
+    found, which = np.unique(np.stack(tables), axis=0, return_inverse=True)
+    return found, which.reshape(-1).astype(np.int32)
 
 
 def gaussian() -> ReconstructionFilter:
@@ -65,7 +72,7 @@ def ewa_filter(textures: Textures, subpixels: SubpixelFilter | None = None) -> E
         one = gaussian()
         table, first = by_distance(one, one.radius)[None], np.zeros((1, 1, CHANNELS), np.int32)
         reach = np.array([1.0, 1.0], np.float32) * np.float32(one.radius)
-        return Ewa(table, None, reach, np.concatenate([-reach, reach]), None, first, np.float32(PIXEL_STEP), levels, None)
+        return Ewa(table, None, reach, np.concatenate([-reach, reach]), None, first, first, np.float32(PIXEL_STEP), levels, None)
 
     # Each filter once, and where in a period which of them stands
     which = triples(subpixels.layout)
@@ -75,17 +82,19 @@ def ewa_filter(textures: Textures, subpixels: SubpixelFilter | None = None) -> E
     reach_x, reach_y = subpixels.radius
     low, high = centers.reshape(-1, 2).min(axis=0), centers.reshape(-1, 2).max(axis=0)
     if subpixels.down is None:
-        across, down = np.stack([by_distance(one, reach_x) for one in subpixels.across]), None
+        across, of_across = distinct([by_distance(one, reach_x) for one in subpixels.across])
+        down, of_down = None, of_across
     else:
-        across = np.stack([running_integral(one, reach_x) for one in subpixels.across])
-        down = np.stack([running_integral(one, reach_y) for one in subpixels.down])
+        across, of_across = distinct([running_integral(one, reach_x) for one in subpixels.across])
+        down, of_down = distinct([running_integral(one, reach_y) for one in subpixels.down])
     return Ewa(
         across,
         down,
         np.array([reach_x, reach_y], np.float32),
         np.array([low[0] - reach_x, low[1] - reach_y, high[0] + reach_x, high[1] + reach_y], np.float32),
         centers.astype(np.float32),
-        which.astype(np.int32),
+        of_across[which],
+        of_down[which],
         np.float32(SUBPIXEL_STEP),
         levels,
         None,

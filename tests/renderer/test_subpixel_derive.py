@@ -175,6 +175,12 @@ def test_colors_keep_their_light_as_signals() -> None:
     rgb = np.random.default_rng(2).uniform(0.0, 1.0, (50, 3))
     for name in SHIPPED:
         np.testing.assert_allclose(layout(name).signal(rgb) @ layout(name).light(), rgb, atol=1e-12)
+    display = layout("rgbw")
+    assert display.white_share == pytest.approx(0.37 / 0.66)
+    assert display.signal(np.ones((1, 3), np.float32)).dtype == np.float32
+    bright = dataclasses.replace(display, opponent=display.opponent * [1, 1, 1, 3])
+    np.testing.assert_allclose(bright.signal(rgb) @ bright.light(), rgb, atol=1e-12)
+    assert bright.signal(rgb).min() > -1e-15
 
 
 # --- Limits -----------------------------------------------------------------------------------------------------------
@@ -342,9 +348,17 @@ def test_a_box_that_does_not_see_color_gives_the_smallest_drive() -> None:
 
 
 def test_kernels_that_darken_or_overdrive_are_warned_of() -> None:
-    """From so near that the pattern is seen, white is dimmed; color that hardly counts is traded for overdrive. Shipped defaults are silent."""
+    """From so near that the pattern is seen, white is dimmed; color that hardly counts is traded for overdrive. Of the defaults only RGBW's W is."""
     for name in SHIPPED:
-        assert derive(layout(name)).warnings() == ()
+        kernels = derive(layout(name))
+        assert kernels.white_drive[0] == pytest.approx(
+            apply_kernels(kernels, np.ones((*kernels.h.shape[2:], 1)) * layout(name).signal(np.ones(3)))[tuple(layout(name).active[0])]
+        )
+        if name == "rgbw":
+            assert kernels.white_drive == pytest.approx([0.275, 0.275, 0.275, 1.295], abs=0.002)
+            assert "white drives W to 1.29" in " ".join(kernels.warnings())
+        else:
+            assert kernels.warnings() == ()
     near = derive(layout("rgbg"), Viewing(100.0, 10.0))
     assert "white is shown as" in " ".join(near.warnings())
     assert near.white.max() < 0.9
@@ -375,6 +389,14 @@ def test_layouts_that_do_not_fit_together_are_refused(change: dict[str, object],
     """With what is wrong."""
     with pytest.raises(ValueError, match=words):
         dataclasses.replace(stripe("broken", "RGB"), **change)  # type: ignore[arg-type]
+
+
+def test_a_w_without_light_is_refused() -> None:
+    """Nothing could be given to it."""
+    display = layout("rgbw")
+    for columns in ([1, 1, 1, 0], [0, 0, 0, 1], [1, 1, 1, -1]):
+        with pytest.raises(ValueError, match="W has a luminance"):
+            dataclasses.replace(display, opponent=display.opponent * columns)
 
 
 def test_other_arguments_that_make_no_sense_are_refused() -> None:

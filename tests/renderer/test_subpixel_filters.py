@@ -176,6 +176,15 @@ def test_the_optimal_filter_is_clamped_at_zeros_of_its_sinc() -> None:
         fit(derive(display))[0].reconstruction(display, 0)
 
 
+def test_a_product_has_its_own_filter_down() -> None:
+    """Of positions that are three times as high as wide: each factor in its own pixels."""
+    one = Fit(1.1, 30.0, 1 / 3, 0, 0, 0, "separable", 2.9, 2.0)
+    filter_ = subpixel_filter("optimal", SHIFTED, (one,) * 6, zeros=3)
+    assert filter_.radius == pytest.approx((3 * math.pi / 1.1 / 3, 3 * math.pi / 2.9))
+    dx, dy = np.random.default_rng(4).uniform(-1.5, 1.5, (2, 30))
+    assert weights(filter_, 2, dx, dy) * one.scale == pytest.approx(one.values(3.0 * dx, dy), abs=1e-15)
+
+
 def test_a_fast_gaussian_ends_a_filter_before_its_zeros() -> None:
     """A sinc so wide that its zeros are far outside of the window costs no samples there."""
     filter_ = Fit(0.01, 4.0, 1 / 3, 0, 0).reconstruction(layout("rgb_stripe"), 2)

@@ -5,6 +5,7 @@ import html.parser
 import json
 import pathlib
 import re
+import shutil
 import zipfile
 from typing import Any
 
@@ -247,6 +248,24 @@ def test_views_of_a_run_are_shown(run_folder: pathlib.Path, tmp_path: pathlib.Pa
     assert "pictures/view-flight-png.png" in page.links
     assert "1,200" in page.text
     assert "pictures/view-gone.png" not in page.links
+
+
+def test_subpixel_filters_are_told_where_there_are_any(run_folder: pathlib.Path, page: Page, tmp_path: pathlib.Path) -> None:
+    assert "subpixel-heading" not in page.ids
+    analysis = run_folder / "subpixel"
+    analysis.mkdir()
+    try:
+        (analysis / "index.html").write_text("<!doctype html><title>all of it</title>")
+        (analysis / "page.json").write_text('{"files": ["index.html"], "figures": []}')
+        (analysis / "subpixel.json").write_text('{"page": "index.html", "summary": "On <x>, box comes closest.\\nOn y, none does."}')
+        shown = Page(write(run_folder, tmp_path / "report").read_text("utf-8"))
+    finally:
+        shutil.rmtree(analysis)
+    assert "subpixel-heading" in shown.ids
+    assert "#subpixel" in shown.links
+    assert "On <x>, box comes closest." in shown.text
+    assert "subpixel/index.html" in shown.links
+    assert (tmp_path / "report" / "subpixel" / "index.html").read_text().endswith("<title>all of it</title>")
 
 
 # --- parts ---------------------------------------------------------------------------------------------------------

@@ -20,6 +20,7 @@ from queries.subpixel.preference import layouts_ranked, methods_ranked
 from renderer.filters.subpixel.derive import derive
 from renderer.filters.subpixel.layout import Layout
 from renderer.filters.subpixel.methods import METHODS
+from renderer.filters.subpixel.sensitivity import box
 from renderer.filters.subpixel.windowed_sinc import fit
 from viz.report.pages import environment
 from viz.report.picture import Picture
@@ -28,7 +29,7 @@ from viz.subpixel.figure import Figure
 from viz.subpixel.findings import best, losses, result, summary
 from viz.subpixel.page import write_page
 from viz.subpixel.pattern import pattern_drawing, pattern_in_words
-from viz.subpixel.sections import matrices, warnings
+from viz.subpixel.sections import condition_table, matrices, times, warnings
 
 EVIL = "<script>document.title='obeyed'</script>"
 IMAGES = ("text", "hair", "foliage", "wire_frame", "zone_plate", EVIL)
@@ -252,6 +253,12 @@ def test_findings_name_the_best_and_the_losses() -> None:
     assert best(analysis(False)) == {}
 
 
+def test_times_of_one_display_are_one_stage() -> None:
+    taken = {"derivation": 0.5, "rgbg: box": 1.0, "rgbg: optimal": 2.0, "comparison": 4.0}
+    expected = [("derivation", 0.5), ("filtering for PenTile RGBG", 3.0), ("comparison", 4.0)]
+    assert times(dataclasses.replace(analysis(False), seconds=taken)) == expected
+
+
 def test_marks_of_scores() -> None:
     scores = analysis().scores
     assert scores is not None
@@ -264,13 +271,16 @@ def test_marks_of_scores() -> None:
     assert marks["Wire frame"]["Box per pixel"].text == "5.20"
 
 
-def test_singular_systems_are_told() -> None:
+def test_singular_systems_are_told(tmp_path: pathlib.Path) -> None:
     found = analysis(False)
     assert not any("singular" in text for text in warnings(found))
     display = found.displays[0]
-    kernels = dataclasses.replace(display.kernels, deficient=3)
-    changed = dataclasses.replace(found, displays=(dataclasses.replace(display, kernels=kernels),))
-    assert any(re.match(r"RGB stripe: 3 of \d+ systems are singular", text) for text in warnings(changed))
+    narrow = derive(display.layout, sensitivity=box((4.0, 1.0, 1.0)), size=(1, 24))
+    assert narrow.singular
+    changed = dataclasses.replace(found, displays=(dataclasses.replace(display, kernels=narrow),))
+    page = Page(write_page(tmp_path, changed, [], []).read_text("utf-8"))
+    assert f"the system is singular for {narrow.deficient} of {narrow.residues} residues" in page.text
+    assert f"{narrow.deficient} of {narrow.residues}" in [cell.text for cell in condition_table(changed).rows[0]]
 
 
 def rects(layout: Layout) -> list[tuple[float, ...]]:
@@ -328,7 +338,7 @@ def test_the_section_has_the_ranking_and_the_whole_page(run: pathlib.Path, folde
     assert found is not None
     assert found.summary == summary(analysis())
     assert [table.caption for table in found.tables] == [
-        f"Methods on {name} by 6 images, the best first" for name in ("RGB stripe", "PenTile RGBG", "vertical")
+        f"Methods on {name}, judged on 6 images, the best first" for name in ("RGB stripe", "PenTile RGBG", "vertical")
     ]
     assert found.tables[0].rows[0][1].text == "Optimal, all kernels"
     assert [column.heading for column in found.tables[0].columns][2] == "S-CIELAB (95 % interval)"

@@ -38,6 +38,7 @@ _HEADINGS = {
     "clipped": "clipped",
 }
 _SHARES = ("clipped",)  # with a bar
+_DIFFERENCES = ("scielab", "scielab_95", "scielab_unclipped", "lightness", "chroma")  # of colors
 _PERCENT = ("wins", "stability")
 
 
@@ -100,7 +101,7 @@ def layouts_table(layouts: pa.Table) -> Table:
 def _over(ranked: pa.Table) -> str:
     """On how many images a ranking rests, which is the same in all of its rows."""
     counts = pc.unique(ranked["images"]).to_pylist()
-    return f" by {counts[0]} images" if len(counts) == 1 and counts[0] > 1 else ""
+    return f", judged on {counts[0]} images" if len(counts) == 1 and counts[0] > 1 else ""
 
 
 def _table(caption: str, answer: pa.Table, cut: int = 0) -> Table:
@@ -146,6 +147,8 @@ def _cell(column: Column, row: Mapping[str, Any], ends: tuple[str, str] | None) 
         return Cell(percent(value), value, min(100.0, max(0.0, round(100 * value, 2))))
     if isinstance(value, str):
         return Cell(value, value)
+    if column.name in _DIFFERENCES:
+        return Cell(_three(value, value), value)
     return Cell(percent(value, 2) if column.name in _PERCENT else number(value), float(value))
 
 

@@ -23,7 +23,7 @@ from viz.subpixel.mosaic import as_picture, enlarged, mosaic, pixel_light
 F32 = npt.NDArray[np.float32]
 
 PATTERN = "zone_plate"
-SIZE, ENLARGED = 104, 4  # pixels of the display, across and down; screen pixels for each
+SIZE, ENLARGED = 108, 4  # pixels of the display, across and down; screen pixels for each
 TIMES = 32  # by how much the thesis scales the difference
 NOTICED = 1.0  # S-CIELAB difference that can just be seen
 STATED_SHARE = 0.95  # of the picture must stay below that for a difference to be insignificant
@@ -35,7 +35,7 @@ class Influence:
 
     ``largest`` and ``mean``: of the absolute difference of drives, cut to [0, 1]; ``above``: the share of drives whose difference is beyond full
     drive when it is scaled. ``noticed``: the share of the picture in which S-CIELAB tells both
-    apart; ``scielab`` and ``scielab_95``: mean and 95th percentile of that difference.
+    apart; ``scielab`` and ``scielab_95``: mean and 95th percentile of that difference; ``gray``: ``noticed`` in the gray half of the pattern alone.
     """
 
     full: F32
@@ -46,6 +46,7 @@ class Influence:
     scielab: float
     scielab_95: float
     noticed: float
+    gray: float
 
 
 def band_pass_figure(display: Display, description: SubpixelDescription, folder: pathlib.Path) -> Figure:
@@ -63,11 +64,11 @@ def band_pass_figure(display: Display, description: SubpixelDescription, folder:
         file=file,
         alt=f"Three pictures of a zone plate: by all kernels, by the low-pass kernels alone, and {TIMES} times their difference, whose mean is "
         f"{number(found.mean)} of full drive.",
-        caption=f"A zone plate with every frequency up to the pixel Nyquist frequency at the middle of its edges (gray on the left, red against green at the "
-        f"upper right, blue against yellow at the lower right), on {SIZE} x {SIZE} pixels of {title}: the mean light of the subpixels around "
-        f"each pixel's center, sRGB. Right: the absolute difference of linear light, × {TIMES}. {settings(description)}.",
-        thesis="Section 4.5.1 and Fig. 4.8: left out, the band-pass kernels make a visually insignificant difference on a high-frequency pattern, which "
-        f"becomes visible only when it is scaled {TIMES}-fold.",
+        caption="A zone plate with every frequency up to the pixel Nyquist frequency at the middle of its edges (gray on the left, red against "
+        f"green at the upper right, blue against yellow at the lower right), on {SIZE} x {SIZE} pixels of {title}: the mean light of the subpixels "
+        f"around each pixel's center, sRGB. Right: the absolute difference of linear light, × {TIMES}. {settings(description)}.",
+        thesis="Section 4.5.1 and Fig. 4.8: left out, the band-pass kernels make a visually insignificant difference on a high-frequency pattern, "
+        f"which becomes visible only when it is scaled {TIMES}-fold.",
         agreement=agreement,
         comparison=comparison,
     )
@@ -84,13 +85,15 @@ def influence(display: Display, description: SubpixelDescription) -> Influence:
     lights = [shown(lattice, layout, fine, clip=True) for lattice in (full, own)]
     seen = scielab(lights[0], lights[1], description.viewing.degrees_per_pixel / fine)
     return Influence(
-        *(pixel_light(lattice, layout) for lattice in (full, own)),
+        full=pixel_light(full, layout),
+        own=pixel_light(own, layout),
         largest=float(change.max()),
         mean=float(change.mean(dtype=np.float64)),
         above=float(np.mean(change > 1 / TIMES)),
         scielab=float(seen.mean(dtype=np.float64)),
         scielab_95=float(np.percentile(seen, 95)),
         noticed=float(np.mean(seen > NOTICED)),
+        gray=float(np.mean(seen[:, : seen.shape[1] // 2] > NOTICED)),
     )
 
 
@@ -99,11 +102,11 @@ def compared(found: Influence, description: SubpixelDescription) -> tuple[Agreem
     limit = 1 - STATED_SHARE
     insignificant, faint = found.noticed <= limit, found.above <= limit
     text = (
-        f"S-CIELAB sees a mean difference of {number(found.scielab)}, {number(found.scielab_95)} at the 95th percentile; {percent(found.noticed)} of the "
-        f"picture lies above {NOTICED:g}, which can just be seen: {'insignificant' if insignificant else 'not insignificant'} (limit {percent(limit)}). "
-        f"Drives differ by {number(found.mean)} of full drive on average and {number(found.largest)} at most; {percent(found.above)} of them by more than "
-        f"1/{TIMES}, so that scaled they are beyond full drive: {'faint' if faint else 'larger than a difference that shows only when scaled'} "
-        f"(limit {percent(limit)})."
+        f"S-CIELAB sees a mean difference of {number(found.scielab)}, {number(found.scielab_95)} at the 95th percentile; {percent(found.noticed)} "
+        f"of the picture ({percent(found.gray)} of its gray half) lies above {NOTICED:g}, which can just be seen: "
+        f"{'insignificant' if insignificant else 'not insignificant'} (limit {percent(limit)}). Drives differ by {number(found.mean)} of full drive "
+        f"on average and {number(found.largest)} at most; {percent(found.above)} of them by more than 1/{TIMES}, so that scaled they are beyond "
+        f"full drive: {'faint' if faint else 'larger than a difference that shows only when scaled'} (limit {percent(limit)})."
     )
     if not same_viewer(description):
         text += " The thesis's viewer is another one, so its bands lie at other frequencies."

@@ -1,6 +1,5 @@
 """How methods and displays compare, as Fig. 4.12 and Fig. 4.13 of the thesis do, by S-CIELAB in the place of a study with people."""
 
-import math
 import pathlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -54,7 +53,9 @@ def methods_figure(analysis: Analysis, layout: str, folder: pathlib.Path) -> Fig
     title, rows = layout_title(layout), ranked.to_pylist()
     points = scores_of(analysis.scores, "method", "layout", layout)
     file = folder / f"methods_{layout}.png"
-    dot_plot(file, [(method_title(row["method"]), row, points[row["method"]], row["method"] in DERIVED) for row in rows], f"{title}: methods compared")
+    dot_plot(
+        file, [(method_title(row["method"]), row, points[row["method"]], row["method"] in DERIVED) for row in rows], f"{title}: methods compared"
+    )
     agreement, comparison = compared_methods(points, rows)
     images = len(next(iter(points.values())))
     return Figure(
@@ -64,11 +65,9 @@ def methods_figure(analysis: Analysis, layout: str, folder: pathlib.Path) -> Fig
         alt=f"A dot plot of {len(rows)} methods by mean S-CIELAB difference, from {method_title(rows[0]['method'])} ({rows[0]['scielab']:.2f}) to "
         f"{method_title(rows[-1]['method'])} ({rows[-1]['scielab']:.2f}).",
         caption=f"How far {title} is from the picture at full resolution by each method: S-CIELAB difference (about 1 can just be seen), mean over "
-        f"{images} images, with its 95 % interval from resampling the images; small dots: single images. Right: both, and how it "
-        "differs from the optimal filter image by image, where the 95 % interval of that difference leaves out 0. Blue: the derived filters; orange: others. "
-        f"{settings(analysis.description)}.",
-        thesis="Fig. 4.12 and section 4.5.4: 22 people preferred the optimal filter significantly (p < 0.01, t-test) to a box and a Mitchell filter for each "
-        "subpixel and to a Mitchell filter for each pixel, on six images.",
+        f"{_how_told(images, 'the optimal filter')} Blue: the derived filters; orange: others. {settings(analysis.description)}.",
+        thesis="Fig. 4.12 and section 4.5.4: 22 people preferred the optimal filter significantly (p < 0.01, t-test) to a box and a Mitchell "
+        "filter for each subpixel and to a Mitchell filter for each pixel, on six images.",
         agreement=agreement,
         comparison=comparison,
     )
@@ -92,11 +91,11 @@ def layouts_figure(analysis: Analysis, folder: pathlib.Path) -> Figure | None:
         file=file,
         alt=f"A dot plot of {len(rows)} displays by mean S-CIELAB difference, from {layout_title(rows[0]['layout'])} ({rows[0]['scielab']:.2f}) to "
         f"{layout_title(rows[-1]['layout'])} ({rows[-1]['scielab']:.2f}).",
-        caption="How far each display is from the picture at full resolution by the optimal filter: S-CIELAB difference (about 1 can just be seen), mean "
-        f"over {images} images, with its 95 % interval from resampling the images; small dots: single images. Right: both, and how it "
-        f"differs from {layout_title(reference)} image by image, where the 95 % interval of that difference leaves out 0. Displays have equally "
-        f"many pixels, not subpixels. {settings(analysis.description)}.",
-        thesis="Fig. 4.13 and section 4.5.4: RGB and RGBW were not significantly different; both were significantly better than RGBG (p < 0.01, t-test).",
+        caption="How far each display is from the picture at full resolution by the optimal filter: S-CIELAB difference (about 1 can just be "
+        f"seen), mean over {_how_told(images, layout_title(reference))} Displays have equally many pixels, not subpixels. "
+        f"{settings(analysis.description)}.",
+        thesis="Fig. 4.13 and section 4.5.4: RGB and RGBW were not significantly different; both were significantly better than RGBG (p < 0.01, "
+        "t-test).",
         agreement=agreement,
         comparison=comparison,
     )
@@ -134,10 +133,12 @@ def compared_methods(points: Mapping[str, F64], rows: Sequence[Mapping[str, Any]
     same = [name for name in there if name not in better and name not in worse]
     groups = (("significantly better than", better), ("not told apart from", same), ("significantly worse than", worse))
     text += " It is " + "; ".join(f"{how} {listed([TITLES.get(name, name) for name in names])}" for how, names in groups if names) + "."
-    first = [row["method"] for row in rows if row["method"] != OPTIMAL and row["scielab"] < next(r["scielab"] for r in rows if r["method"] == OPTIMAL)]
+    first = [
+        row["method"] for row in rows if row["method"] != OPTIMAL and row["scielab"] < next(r["scielab"] for r in rows if r["method"] == OPTIMAL)
+    ]
     text += f" By the mean it ranks behind {listed([TITLES.get(n, n) for n in first])}." if first else " By the mean it ranks first of all."
     if count < FEWEST_IMAGES:
-        return "not comparable", f"{text} {count} images are too few to tell: {FEWEST_IMAGES} are needed."
+        return "not comparable", f"{text} {_few(count)}"
     return ("agrees" if len(better) == len(STUDIED) else "differs"), text
 
 
@@ -162,7 +163,7 @@ def compared_layouts(points: Mapping[str, F64], families: Mapping[str, str]) -> 
         )
     )
     if len(points[names["RGB"]]) < FEWEST_IMAGES:
-        return "not comparable", f"{text} So few images are too few to tell: {FEWEST_IMAGES} are needed."
+        return "not comparable", f"{text} {_few(len(points[names['RGB']]))}"
     return ("agrees" if alike.p >= SIGNIFICANT and rgb.better and rgbw.better else "differs"), text
 
 
@@ -176,10 +177,14 @@ def dot_plot(file: pathlib.Path, rows: Sequence[tuple[str, Mapping[str, Any], F6
     for i, (_, row, points, derived) in enumerate(rows):
         color = COLORS[0] if derived else COLORS[1]
         axes.axhline(i, color=FAINT, linewidth=0.7, zorder=1)
-        axes.plot(np.maximum(points, 1e-4), np.full(len(points), i + _SIDE), "o", color=color, markersize=3.4, alpha=0.55, markeredgewidth=0, zorder=2)
-        axes.plot([row["low"], row["high"]], [i, i], "-", color=color, linewidth=2.2, solid_capstyle="butt", zorder=3)
+        axes.plot(
+            np.maximum(points, 1e-4), np.full(len(points), i + _SIDE), "o", color=color, markersize=3.4, alpha=0.55, markeredgewidth=0, zorder=2
+        )
+        known = row["low"] is not None and row["high"] is not None  # of too few images no interval is told
+        if known:
+            axes.plot([row["low"], row["high"]], [i, i], "-", color=color, linewidth=2.2, solid_capstyle="butt", zorder=3)
         axes.plot([row["scielab"]], [i], "o", color=color, markersize=9, markeredgecolor="white", zorder=4)
-        text = f"{row['scielab']:.2f}  [{row['low']:.2f}, {row['high']:.2f}]" if math.isfinite(row["low"]) else f"{row['scielab']:.2f}"
+        text = f"{row['scielab']:.2f}  [{row['low']:.2f}, {row['high']:.2f}]" if known else f"{row['scielab']:.2f}"
         axes.annotate(text, (1.01, i), xycoords=("axes fraction", "data"), va="center_baseline", fontsize=9, color=INK)
         verdict = "" if row["verdict"] in ("reference", "too few images") else row["verdict"]
         axes.annotate(verdict, (1.01, i + 0.34), xycoords=("axes fraction", "data"), va="center_baseline", fontsize=7.5, color=QUIET)
@@ -188,9 +193,24 @@ def dot_plot(file: pathlib.Path, rows: Sequence[tuple[str, Mapping[str, Any], F6
     quiet(axes)
     axes.tick_params(axis="y", length=0, labelsize=9.5)
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel("mean S-CIELAB difference to full resolution (log axis), 95 % interval; small: single images", fontsize=9)
+    interval = ", 95 % interval" if all(row["low"] is not None for _, row, *_ in rows) else ""
+    axes.set_xlabel(f"mean S-CIELAB difference to full resolution (log axis){interval}; small: single images", fontsize=9)
     plain_numbers(axes.xaxis, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
     save_panels(figure, file)
+
+
+def _how_told(images: int, reference: str) -> str:
+    """What the dots and numbers of a chart over so many images are, as the end of a sentence and more."""
+    if images < FEWEST_IMAGES:
+        return f"{images} image{'s' * (images != 1)}, too few for intervals; small dots: single images."
+    return (
+        f"{images} images, with its 95 % interval from resampling the images; small dots: single images. Right: both, and how it differs from "
+        f"{reference} image by image, where the 95 % interval of that difference leaves out 0."
+    )
+
+
+def _few(count: int) -> str:
+    return f"{count} {'image is' if count == 1 else 'images are'} too few to tell: {FEWEST_IMAGES} are needed."
 
 
 def _test(test: PairedTest) -> str:

@@ -11,6 +11,8 @@ from viz.subpixel.look import listed
 
 OPTIMAL = ("optimal", "kernels")  # the derived methods; the others are simpler
 _NAMED = 3  # losses of a display that are told one by one, the largest first
+# What a verdict on one against the analytic optimal filter says of the first of the two
+_TOLD = dict.fromkeys(("better", "worse"), "; the first is better beyond chance") | {"not told apart": "; these images do not tell the two apart"}
 _ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
 
 
@@ -72,22 +74,17 @@ def _of_layout(analysis: Analysis, layout: str, lost: list[Loss]) -> str:
     if place is None:
         return text
     if place:
-        text += f" {_behind(place, ranked[place], first)}"
+        nth = _ORDINALS[place] if place < len(_ORDINALS) else f"number {place + 1}"
+        text += f" The analytic optimal filter is {nth}, with {_scored(ranked[place])}{_TOLD.get(first['verdict'], '')}."
+    elif len(ranked) > 1:
+        text += f" Next is {_called(ranked[1]['method'])}, with {_scored(ranked[1])}{_TOLD.get(ranked[1]['verdict'], '')}."
     if not lost:
         return f"{text} No simpler method beats the optimal filter on any image."
     count = f"{len(lost)} of {images} images" if images > 1 else "the image"
     worst = sorted(lost, key=lambda loss: loss.scielab / max(loss.optimal, 1e-12))
-    named = [f"{image_title(loss.image)} ({_called(loss.method)}: {loss.scielab:.2f} against {loss.optimal:.2f})" for loss in worst[:_NAMED]]
+    named = [f"{image_title(loss.image)} ({_called(loss.method)}: {_told_apart(loss.scielab, loss.optimal)})" for loss in worst[:_NAMED]]
     named += [f"{len(worst) - _NAMED} more"] if len(worst) > _NAMED else []
     return f"{text} A simpler method beats {'it' if place else 'the analytic optimal filter'} on {count}: {listed(named)}."
-
-
-def _behind(place: int, optimal: Mapping[str, Any], first: Mapping[str, Any]) -> str:
-    """Where the analytic optimal filter stands, if it is not the first, and whether the images tell the two apart."""
-    nth = _ORDINALS[place] if place < len(_ORDINALS) else f"number {place + 1}"
-    text = f"The analytic optimal filter is {nth}, with {_scored(optimal)}"
-    told = {"better": "; the first is better beyond chance", "not told apart": "; these images do not tell the two apart"}
-    return f"{text}{told.get(first['verdict'], '')}."
 
 
 def _scored(row: Mapping[str, Any]) -> str:
@@ -95,6 +92,12 @@ def _scored(row: Mapping[str, Any]) -> str:
     low, high = row["low"], row["high"]
     text = interval(row["scielab"], None, None)
     return text if low is None or high is None else f"{text} (95\u00a0% interval {interval(low, None, None)} to {interval(high, None, None)})"
+
+
+def _told_apart(value: float, other: float) -> str:
+    """Two numbers with as many digits as it takes to see that they differ, four at most."""
+    digits = next((n for n in (2, 3) if f"{value:.{n}f}" != f"{other:.{n}f}"), 4)
+    return f"{value:.{digits}f} against {other:.{digits}f}"
 
 
 def _called(method: str) -> str:

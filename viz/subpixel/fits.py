@@ -34,8 +34,8 @@ class FitRow:
 
     ``model``: what x is (``renderer.filters.subpixel.windowed_sinc.Fit``); ``a_down`` and ``b_down`` are there for products of two such filters.
     ``applied``: whether the subpixel is filtered with it; others are fitted as the thesis fits, for comparison with its table.
-    ``rms``, ``largest``: how far the kernel's values lie from the curve; ``relative``: the first in units of the kernel's root mean square. ``agreement``: of a and b with the table, within 2 and 5 percent;
-    not comparable where the table has no such layout, or the viewer is another one.
+    ``rms``, ``largest``: how far the kernel's values lie from the curve; ``relative``: the first in units of the kernel's root mean square.
+    ``agreement``: of a and b with the table, within 2 and 5 percent; not comparable where the table has no such layout, or the viewer is another.
     """
 
     layout: str
@@ -62,7 +62,7 @@ def family(layout: Layout) -> str:
 
 
 def stated(layout: Layout) -> tuple[tuple[float, float], ...] | None:
-    """a and b of each subpixel as Table 4.1 states them (a stripe in reverse order has the stripe's), or None for displays it does not list."""
+    """Table 4.1: a and b of each subpixel (a stripe in reverse order has the stripe's), or None for displays it does not list."""
     return _TABLE.get(("".join(letters(layout)), tuple(float(s) for s in layout.spacing), len(layout.pattern)))
 
 
@@ -118,12 +118,12 @@ def compared_fits(rows: list[FitRow], description: SubpixelDescription) -> tuple
     text += f"({worst.subpixel}), {percent(worst.relative)} of its kernel's own root mean square."
     table = fits_in_words(rows)
     if not table:
-        return ("agrees" if good else "differs"), f"{text} Table 4.1 does not list this display."
+        return "not comparable", f"{text} Table 4.1 does not list this display."
     text += f" Ours beside Table 4.1: {table}."
     if not same_viewer(description):
         text += (
-            f" The parameters depend on the viewer, and this one's pixel Nyquist frequency is {pixel_nyquist(description):.3g} cpd, the thesis's about "
-            f"{STATED_PEAK:g}: only the errors are judged."
+            f" The parameters depend on the viewer, and this one's pixel Nyquist frequency is {pixel_nyquist(description):.3g} cpd, the thesis's "
+            f"about {STATED_PEAK:g}: only the errors are judged."
         )
         return ("agrees" if good else "differs"), text
     off = [row.subpixel for row in rows if row.agreement == "differs"]

@@ -15,6 +15,7 @@ from viz.subpixel.fits import compared_fits, display_rows, family
 from viz.subpixel.look import (
     PRIMARY_COLORS,
     PRIMARY_WORDS,
+    choice,
     colored_lines,
     listed,
     new_panels,
@@ -23,6 +24,7 @@ from viz.subpixel.look import (
     room,
     save_panels,
     settings,
+    shown_subpixels,
     subpixel_names,
     subpixel_words,
 )
@@ -34,20 +36,21 @@ ZEROS = 4  # of the widest sinc, on each side, that the axis shows
 _STATED = {
     "RGB": "Fig. 4.3 shows nine kernels of the RGB stripe. Section 4.3.3 models the three low-pass ones by a Gaussian-windowed sinc with a root mean "
     "square error below 0.02 for each channel, with the parameters of Table 4.1.",
-    "RGBG": "Fig. 4.6 shows the low-pass kernels of RGBG: those of red and blue adapt to their lower resolution and reach farther than those of the two "
-    "greens. Table 4.1 lists their parameters.",
+    "RGBG": "Section 4.3.4: the kernels of RGBG are low-pass ones of Gaussian-windowed sincs, with the parameters of Table 4.1; Fig. 4.6 omits the "
+    "others.",
 }
 
 
 def kernels_figure(display: Display, description: SubpixelDescription, folder: pathlib.Path) -> Figure:
     """One panel for each subpixel: its kernels as dots, colored by the primary they come from, and the fit of its own one as a line."""
     layout, h, offsets = display.layout, display.kernels.h[:, :, 0], display.kernels.columns_at
-    title, words = layout_title(layout.name), subpixel_words(layout)
+    shown = shown_subpixels(layout)
+    title, words = layout_title(layout.name), [subpixel_words(layout)[i] for i in shown]
     reach = int(ZEROS * layout.spacing.max())
     near = np.abs(offsets) <= reach
     rows, columns = panel_grid(len(words))
     figure, panels = new_panels(rows, columns, 3.5 if rows == 1 else 0.5 + 2.5 * rows, f"{title}: all kernels", sharex=True, sharey=True)
-    for subpixel, axes in enumerate(panels.ravel()[: len(words)]):
+    for subpixel, axes in zip(shown, panels.ravel(), strict=False):
         _draw_panel(axes, display, subpixel, offsets[near], h[subpixel][:, near])
     for axes in panels.ravel()[len(words) :]:
         axes.set_axis_off()
@@ -66,12 +69,12 @@ def kernels_figure(display: Display, description: SubpixelDescription, folder: p
         name=f"kernels_{layout.name}",
         title=f"Kernels of {title}",
         file=file,
-        alt=f"{len(words)} charts of weight over offset, one for each subpixel ({listed(list(words))}), with {h.shape[0] * h.shape[1]} kernels; "
-        f"each subpixel's own kernel is the tallest, {h.max():.2g} at its center.",
-        caption=f"What each subpixel of {title} takes from the red, green and blue of the image at each offset. Dots: the kernels as they were solved, "
-        "colored by the channel that influences the subpixel. Line: the analytic filter sin(ax)/(ax)·exp(−x²/b), times the kernel's value at 0, "
-        f"fitted to the subpixel's own kernel. A pixel is {layout.cells[0]} positions wide; {reach} of the {len(offsets)} positions are shown to each side. "
-        f"{settings(description)}.",
+        alt=f"{len(words)} charts of weight over offset, one for each subpixel ({listed(words)}), with {len(shown) * h.shape[1]} kernels; "
+        f"the largest weight is {h.max():.2g}.",
+        caption=f"What each subpixel of {title} takes from the red, green and blue of the image at each offset. Dots: the kernels as they were "
+        "solved, colored by the channel that influences the subpixel. Line: the analytic filter sin(ax)/(ax)·exp(−x²/b), times the kernel's value "
+        f"at 0, fitted to the subpixel's own kernel. A pixel is {layout.cells[0]} positions wide; {reach} of the {len(offsets)} positions are shown "
+        f"to each side.{choice(layout)} {settings(description)}.",
         thesis=_STATED.get(family(layout), ""),
         agreement=agreement,
         comparison=comparison,

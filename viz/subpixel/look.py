@@ -17,6 +17,7 @@ PRIMARY_COLORS = {"R": "#cf222e", "G": "#1a8f3c", "B": "#2563c9", "W": "#6b6b6b"
 PRIMARY_WORDS = {"R": "red", "G": "green", "B": "blue", "W": "white"}
 QUIET = "#6a6a6a"  # of notes
 WIDTH = 8.4  # inches, as all charts
+MOST_PANELS = 8
 LINE = 12.5  # of text in a panel, points
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -42,6 +43,18 @@ def subpixel_words(layout: Layout) -> tuple[str, ...]:
     found = letters(layout)
     ordinals = ("first ", "second ", "third ", "fourth ", *(f"{n}th " for n in range(5, 1000)))
     return tuple((ordinals[found[:i].count(letter)] if found.count(letter) > 1 else "") + PRIMARY_WORDS[letter] for i, letter in enumerate(found))
+
+
+def shown_subpixels(layout: Layout) -> tuple[int, ...]:
+    """Which subpixels of ``layout.active`` have panels of their own: all, or where they are too many the first of each primary."""
+    found = letters(layout)
+    return tuple(i for i, letter in enumerate(found) if len(found) <= MOST_PANELS or found.index(letter) == i)
+
+
+def choice(layout: Layout) -> str:
+    """What is left out of figures with a panel for each subpixel, as a sentence that begins with a space; nothing where all are shown."""
+    shown = shown_subpixels(layout)
+    return "" if len(shown) == len(layout.active) else f" Of the {len(layout.active)} subpixels of a period the first of each primary is shown."
 
 
 def settings(description: SubpixelDescription) -> str:
@@ -72,10 +85,10 @@ def new_panels(rows: int, columns: int, height: float, title: str, **shared: Any
     """A figure of quiet axes, (rows, columns) of them, ``height`` inches high, with a title at the left. ``shared``: as of matplotlib's subplots."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.03))
     FigureCanvasAgg(figure)
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.03)  # type: ignore[union-attr]
     panels = figure.subplots(rows, columns, squeeze=False, **shared)
     figure.suptitle(title, x=0.012, ha="left", fontsize=11, color=INK)
     for axes in panels.ravel():
@@ -116,7 +129,9 @@ def colored_lines(axes: "Axes", lines: list[tuple[str, str]], right: bool = Fals
     for i, (text, color) in enumerate(lines):
         row, column = divmod(i, columns)
         corner, offset, side = (((column + 1) / columns, 1.0), -4, "right") if right else ((0.0, 1.0), 5, "left")
-        axes.annotate(text, corner, (offset, -4 - LINE * row), "axes fraction", "offset points", ha=side, va="top", fontsize=8.5, color=color, zorder=9)
+        axes.annotate(
+            text, corner, (offset, -4 - LINE * row), "axes fraction", "offset points", ha=side, va="top", fontsize=8.5, color=color, zorder=9
+        )
 
 
 def note(figure: Any, text: str) -> None:

@@ -78,7 +78,7 @@ def pixel_light(lattice: Floating, layout: Layout) -> F32:
 
     # A period more on all sides, so that periods around pixels at the edges are whole
     rows, columns = (_extended(size, period) for size, period in zip(lattice.shape, layout.pattern.shape, strict=True))
-    of = layout.pattern[rows[:, None] % layout.pattern.shape[0], columns % layout.pattern.shape[1]]
+    of = layout.pattern.astype(np.int8)[rows[:, None] % layout.pattern.shape[0], columns % layout.pattern.shape[1]]
     drive = np.clip(lattice[rows[:, None], columns], 0, 1).astype(np.float32)
 
     axes = zip(layout.pattern.shape, layout.cells[::-1], lattice.shape, strict=True)

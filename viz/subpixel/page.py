@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from queries.subpixel.analysis import Analysis
 from viz.report.numbers import seconds
 from viz.report.pages import Copier, Shown, copy_static, environment, picture_size, slug
@@ -15,6 +17,8 @@ from viz.report.subpixel import CONTENTS, interval, layout_title, layouts_table,
 from viz.subpixel import sections
 from viz.subpixel.figure import Figure
 from viz.subpixel.findings import result
+from viz.subpixel.mosaic import pixel_light
+from viz.subpixel.renderings import strongest
 
 _STATIC = ("report.css", "subpixel.css", "report.js", "subpixel.js")
 _PIXEL = 18  # pixels of the screen for each pixel of the display, where a picture is seen closely
@@ -80,6 +84,7 @@ def _contents(analysis: Analysis, figures: Sequence[Told], pictures: Sequence[Cl
         "glance": _glance(analysis),
         "result": result(analysis),
         "pictures": pictures,
+        "middle": _middle(analysis),
         "clipped": [(layout_title(one.layout.name), one.clipped) for one in analysis.displays],
         "method": method_title(analysis.description.method),
         "rankings": ranking_tables(analysis.methods),
@@ -94,7 +99,7 @@ def _contents(analysis: Analysis, figures: Sequence[Told], pictures: Sequence[Cl
         "agreements": [(word, sum(one.figure.agreement == word for one in figures)) for word in ("agrees", "differs", "not comparable")],
         "settings": sections.settings_rows(analysis),
         "patterns": sections.patterns(analysis),
-        "seconds": list(analysis.seconds.items()),
+        "seconds": sections.times(analysis),
         "command": command,
     }
 
@@ -116,6 +121,14 @@ def _closely(shown: Shown, size: tuple[int, int]) -> Closely:
     """A picture whose pixels are positions of the display, whole ones for each of its pixels, can be seen closely."""
     across, down = shown.width / size[0], shown.height / size[1]
     return Closely(shown, _PIXEL / across if across == down and across == int(across) else 0.0)
+
+
+def _middle(analysis: Analysis) -> tuple[int, int]:
+    """Where close views begin, pixels of the screen from the upper left: where the method changes the first display most."""
+    display = analysis.displays[0]
+    change = np.abs(pixel_light(display.lattice, display.layout) - pixel_light(display.standard, display.layout))
+    crop = strongest(change, display.layout)
+    return round(_PIXEL * (crop.left + crop.width / 2)), round(_PIXEL * (crop.top + crop.height / 2))
 
 
 def _told(folder: pathlib.Path, figure: Figure, copier: Copier) -> Told:

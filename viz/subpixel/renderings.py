@@ -2,6 +2,7 @@
 
 import math
 import pathlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from queries.subpixel.description import SubpixelDescription
 from queries.subpixel.display import fine_grid, subpixel_picture
 from renderer.filters.subpixel.layout import Layout
 from renderer.filters.subpixel.methods import TITLES
-from viz.numbers import number
+from viz.numbers import number, percent
 from viz.report.subpixel import layout_title, method_title
 from viz.subpixel.figure import Agreement, Figure
 from viz.subpixel.fits import family
@@ -29,8 +30,8 @@ EVEN = 1.5  # the most affected primary differs at most so many times as much as
 _FRAME = ((0, 0, 0), (255, 221, 51))  # of the part that is enlarged, outside and inside
 
 _STATED = {
-    "RGB": "Fig. 4.9: the difference to standard anti-aliasing is mostly purple for the RGB stripe, as green subpixels stand on the pixels' centers while red "
-    "and blue ones are offset and thus most affected.",
+    "RGB": "Fig. 4.9: the difference to standard anti-aliasing is mostly purple for the RGB stripe, as green subpixels stand on the pixels' centers "
+    "while red and blue ones are offset and thus most affected.",
     "RGBG": "Fig. 4.9: for RGBG the green subpixels are shifted off the pixels' centers, so they are affected too.",
     "RGBW": "Fig. 4.9: all subpixels are roughly equally affected with the 2-D RGBW layout.",
 }
@@ -47,7 +48,7 @@ class Crop:
 
 
 def rendering_figure(display: Display, description: SubpixelDescription, folder: pathlib.Path) -> Figure:
-    """The whole display by the chosen method, by a box for each pixel, and their difference; below, the part with the largest difference, enlarged."""
+    """The whole display by the chosen method, by a box for each pixel, and their difference; below, where that is largest."""
     layout, title, method = display.layout, layout_title(display.layout.name), TITLES[description.method]
     lights = [pixel_light(lattice, layout) for lattice in (display.lattice, display.standard)]
     change = np.abs(lights[0] - lights[1])
@@ -65,17 +66,16 @@ def rendering_figure(display: Display, description: SubpixelDescription, folder:
     below = ["Subpixels in the frame", "Subpixels in the frame", f"Their absolute difference × {TIMES}"]
     mosaic(file, [wholes, parts], [headings, below], f"{title}: rendering", remark)
 
-    means = mean_differences(difference, layout)
-    agreement, comparison = compared(means, layout)
+    agreement, comparison = compared(means(difference, layout), means(drives[1], layout), layout)
     return Figure(
         name=f"rendering_{layout.name}",
         title=f"Rendering for {title}",
         file=file,
-        alt=f"The input on {title} by {method}, by a box for each pixel, and {TIMES} times their difference, whole and as {crop.width} x {crop.height} enlarged "
-        f"pixels at column {crop.left}, row {crop.top}.",
+        alt=f"The input on {title} by {method}, by a box for each pixel, and {TIMES} times their difference, whole and as {crop.width} x "
+        f"{crop.height} enlarged pixels at column {crop.left}, row {crop.top}.",
         caption=f"Above: the light of {title} where subpixels melt into one another, by “{method}” and by the standard box for each pixel, and the "
-        f"absolute difference of linear light × {TIMES}. Below: the subpixels themselves, at their drive, in the framed {crop.width} x {crop.height} pixels, "
-        f"where the difference is largest. All sRGB; {number(100 * display.clipped)} % of the subpixels were clipped.",
+        f"absolute difference of linear light × {TIMES}. Below: the subpixels themselves, at their drive, in the framed {crop.width} x "
+        f"{crop.height} pixels, where the difference is largest. All sRGB; {number(100 * display.clipped)} % of the subpixels were clipped.",
         thesis=_STATED.get(family(layout), ""),
         agreement=agreement,
         comparison=comparison,
@@ -95,42 +95,52 @@ def strongest(change: F32, layout: Layout) -> Crop:
     return Crop(int(left) * step_x, int(top) * step_y, across, down)
 
 
-def mean_differences(difference: F32, layout: Layout) -> dict[str, float]:
-    """The mean of differences of drive, float32 (rows, columns), over the subpixels of each primary, by its letter."""
+def means(drive: F32, layout: Layout) -> dict[str, float]:
+    """The mean of drives or of their differences, float32 (rows, columns), over the subpixels of each primary, by its letter."""
     pattern_rows, pattern_columns = layout.pattern.shape
-    sums, counts = {letter: 0.0 for letter in layout.primaries}, {letter: 0 for letter in layout.primaries}
+    sums, counts = dict.fromkeys(layout.primaries, 0.0), dict.fromkeys(layout.primaries, 0)
     for (row, column), primary in zip(layout.active, layout.active_primaries, strict=True):
-        values = difference[row::pattern_rows, column::pattern_columns]
+        values = drive[row::pattern_rows, column::pattern_columns]
         sums[layout.primaries[primary]] += float(values.sum(dtype=np.float64))
         counts[layout.primaries[primary]] += values.size
     return {letter: sums[letter] / max(1, counts[letter]) for letter in sums}
 
 
-def compared(means: dict[str, float], layout: Layout) -> tuple[Agreement, str]:
-    """Which primaries the difference is in, beside what the thesis states, in words."""
-    text = "Mean absolute differences of drive, in units of full drive: " + ", ".join(f"{PRIMARY_WORDS[k]} {number(v)}" for k, v in means.items()) + "."
+def compared(differences: Mapping[str, float], drives: Mapping[str, float], layout: Layout) -> tuple[Agreement, str]:
+    """Which primaries the difference is in, beside what the thesis states, in words. Of each primary: mean difference, and mean drive.
+
+    Differences are judged in units of the primary's own mean drive, or a reddish picture would have reddish differences by any filter.
+    """
+    named = ", ".join(f"{PRIMARY_WORDS[letter]} {number(value)}" for letter, value in differences.items())
+    text = f"Mean absolute differences, in units of full drive: {named}"
     kind = family(layout)
-    if not kind or max(means.values()) <= 0:
-        return "not comparable", f"{text} {'The thesis shows no such display.' if not kind else 'Both filters give the same picture.'}"
-    red, green, blue = (means[letter] for letter in "RGB")
+    if min(drives.values()) <= 0 or max(differences.values()) <= 0:
+        return "not comparable", f"{text}. {'Both filters give the same picture.' if max(differences.values()) <= 0 else 'A primary is not lit.'}"
+    relative = {letter: differences[letter] / drives[letter] for letter in differences}
+    text += f"; in units of the primary's own mean drive: {', '.join(f'{PRIMARY_WORDS[k]} {percent(v)}' for k, v in relative.items())}."
+    if not kind:
+        return "not comparable", f"{text} The thesis shows no such display."
+    red, green, blue = (relative[letter] for letter in "RGB")
     if kind == "RGB":
         least = min(red, blue) / green if green > 0 else math.inf
-        tint = f" Red and blue differ at least {number(least)} times as much as green (mostly purple: at least {PURPLE:g} times)."
+        tint = f" Relative to that, red and blue differ at least {number(least)} times as much as green (mostly purple: at least {PURPLE:g} times)."
         return ("agrees" if least >= PURPLE else "differs"), text + tint
     if kind == "RGBG":
         share = green / max(red, blue) if max(red, blue) > 0 else math.inf
         return ("agrees" if share >= 1 / EVEN else "differs"), (
-            f"{text} Green differs {number(share)} times as much as the more affected of red and blue (affected too: at least {1 / EVEN:.2g} times)."
+            f"{text} Relative to that, green differs {number(share)} times as much as the more affected of red and blue (affected too: at least "
+            f"{1 / EVEN:.2g} times)."
         )
-    spread = max(means.values()) / min(means.values()) if min(means.values()) > 0 else math.inf
+    spread = max(relative.values()) / min(relative.values()) if min(relative.values()) > 0 else math.inf
     return ("agrees" if spread <= EVEN else "differs"), (
-        f"{text} The most affected primary differs {number(spread)} times as much as the least (roughly equally: at most {EVEN:g} times)."
+        f"{text} Relative to that, the most affected primary differs {number(spread)} times as much as the least (roughly equally: at most {EVEN:g} "
+        "times)."
     )
 
 
 def _fitted(light: F32) -> tuple[U8, float]:
-    """A display's light as a picture that is as wide as a column or, enlarged by a whole number, less; how many of its pixels a pixel of the display has."""
-    height, width, _ = light.shape
+    """A display's light as a picture, enlarged by a whole number or reduced to the width of a column, and by how much."""
+    width = light.shape[1]
     if width <= COLUMN:
         times = COLUMN // width
         return enlarged(as_picture(light), times), float(times)

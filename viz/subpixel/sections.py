@@ -15,7 +15,7 @@ from viz.subpixel.findings import OPTIMAL
 from viz.subpixel.fits import FitRow, fit_rows
 from viz.subpixel.pattern import pattern_drawing, pattern_in_words
 
-_MODELS = {"across": "across", "down": "down", "radial": "distance", "separable": "product of across and down"}
+_MODELS = {"across": "across", "down": "down", "radial": "distance", "separable": "across × down"}
 
 
 @dataclass(frozen=True)
@@ -82,12 +82,16 @@ def fit_table(analysis: Analysis) -> Table:
     columns = [
         Column("layout", "display", "the display that the filter is for", "class"),
         Column("subpixel", "subpixel", "which subpixel of a period it is for, in reading order", "words"),
-        Column("model", "x is", "what x of the filter sin(a x) / (a x) exp(−x² / b) is, in positions of the display’s pattern", "words"),
+        Column(
+            "model",
+            "x is",
+            "what x of the filter is, in positions of the display’s pattern: the offset, the distance, or both offsets in a product",
+            "words",
+        ),
         Column("a", "a", "where the filter’s zeros are; in parentheses, of π; of products, across and then down", "number"),
         Column("b", "b", "how wide its window is, squared positions", "number"),
         Column("rms", "rms", "root mean square of the kernel’s difference from the filter; the thesis states less than 0.02", "number"),
         Column("relative", "relative", "the same in units of the kernel’s own root mean square", "number"),
-        Column("largest", "largest", "the largest such difference", "number"),
         Column("thesis_a", "a, Table 4.1", "as the thesis states it, of the same units", "number"),
         Column("thesis_b", "b, Table 4.1", "as the thesis states it, of the same units", "number"),
         Column("agreement", "agreement", "of a within 2 % and of b within 5 %, where the display is seen at the thesis’s frequencies", "words"),
@@ -96,20 +100,20 @@ def fit_table(analysis: Analysis) -> Table:
 
 
 def _fit_row(row: FitRow) -> list[Cell]:
-    title, model = layout_title(row.layout), _MODELS[row.model] + ("" if row.applied else "; not applied")
+    title, model = layout_title(row.layout), _MODELS[row.model] + ("" if row.applied else " (not applied)")
     a, b = _of_pi(row.a), _width(row.b)
     if row.a_down is not None and row.b_down is not None:
         a, b = f"{a}, {_of_pi(row.a_down)}", f"{b}, {_width(row.b_down)}"
     return [
         *(Cell(title, title), Cell(row.subpixel, row.subpixel), Cell(model, model), Cell(a, row.a), Cell(b, row.b)),
-        *(Cell(number(row.rms, 2), row.rms), Cell(percent(row.relative, 2), row.relative), Cell(number(row.largest, 2), row.largest)),
+        *(Cell(number(row.rms, 2), row.rms), Cell(percent(row.relative, 2), row.relative)),
         *(Cell(_of_pi(row.thesis_a), row.thesis_a), Cell(number(row.thesis_b), row.thesis_b), Cell(row.agreement, row.agreement)),
     ]
 
 
 def _of_pi(value: float | None) -> str:
     """A parameter a, and how many times it goes into π."""
-    return UNKNOWN if value is None else f"{number(value, 3)} (π/{math.pi / value:.3g})"
+    return UNKNOWN if value is None else f"{number(value, 3)} (π/{number(math.pi / value, 3)})"
 
 
 def _width(value: float) -> str:
@@ -123,7 +127,12 @@ def condition_table(analysis: Analysis) -> Table:
         Column("kernels", "kernels", "how many there are: one for each subpixel of a period and each channel of the signal", "number"),
         Column("positions", "signal", "positions of the periodic signal that they were solved on, across and down", "words"),
         Column("step", "step, cpd", "between neighboring frequencies along rows, cycles per degree", "number"),
-        Column("condition", "condition", "the largest ratio of a residue’s singular values; that of the matrix A is its square", "number"),
+        Column(
+            "condition",
+            "condition",
+            "the largest ratio of a residue’s singular values; that of the residue’s part of the matrix A is its square",
+            "number",
+        ),
         Column("singular", "singular systems", "how many of the systems leave some frequencies open, and how many there are", "words"),
     ]
     return Table("Conditioning of the systems", columns, [_condition_row(display) for display in analysis.displays])
@@ -144,17 +153,8 @@ def _condition_row(display: Display) -> list[Cell]:
 
 
 def warnings(analysis: Analysis) -> list[str]:
-    """What should not be trusted: systems that are singular, fits that miss, subpixels that clip."""
-    found = []
-    for display in analysis.displays:
-        kernels, title = display.kernels, layout_title(display.layout.name)
-        if kernels.singular:
-            found.append(
-                f"{title}: {kernels.deficient} of {kernels.residues} systems are singular, as the contrast sensitivity leaves some frequencies open. "
-                "Of all solutions the smallest was taken (truncated pseudo-inverse): what the display can show need not be reproduced exactly."
-            )
-        found += [fit.warning for fit in display.fits if fit.warning]
-    return found
+    """What should not be trusted: systems that are singular, kernels that displays clip, fits that miss."""
+    return [text for one in analysis.displays for text in (*one.kernels.warnings(), *(fit.warning for fit in one.fits)) if text]
 
 
 # --- settings ------------------------------------------------------------------------------------------------------
@@ -177,6 +177,16 @@ def settings_rows(analysis: Analysis) -> list[tuple[str, str]]:
         ("method of the pictures", method_title(described.method)),
         ("optimal filter ends at", f"zero {described.zeros} of its sinc"),
     ]
+
+
+def times(analysis: Analysis) -> list[tuple[str, float]]:
+    """Seconds of each stage; what was spent on filtering for one display, by all methods, is one stage."""
+    found: dict[str, float] = {}
+    for name, taken in analysis.seconds.items():
+        layout, colon, _ = name.partition(": ")
+        stage = f"filtering for {layout_title(layout)}" if colon else name
+        found[stage] = found.get(stage, 0.0) + taken
+    return list(found.items())
 
 
 def patterns(analysis: Analysis) -> list[Pattern]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from queries.subpixel.analysis import Display
 from queries.subpixel.description import SubpixelDescription
 from renderer.filters.subpixel.derive import Kernels
+from renderer.filters.subpixel.layout import Layout
 from viz.charts import FAINT, INK
 from viz.report.subpixel import layout_title
 from viz.subpixel.figure import Agreement, Figure
@@ -17,17 +18,18 @@ from viz.subpixel.fits import STATED_PEAK, family, same_viewer
 from viz.subpixel.look import (
     PRIMARY_COLORS,
     PRIMARY_WORDS,
+    choice,
     colored_lines,
-    letters,
     listed,
     new_panels,
     note,
     panel_grid,
     panel_title,
-    room,
     pixel_nyquist,
+    room,
     save_panels,
     settings,
+    shown_subpixels,
     subpixel_names,
     subpixel_words,
 )
@@ -42,7 +44,6 @@ CLOSE_PEAK = 0.10  # relative deviation of a peak's frequency from what the thes
 LOW_PASS = 0.01  # by how much a low-pass kernel may deviate from 1 at frequency 0
 BAND_PASS = 0.05  # the share of its peak that a band-pass kernel may have at frequency 0
 LOW_AMPLITUDE = 0.5  # of a low-pass kernel at frequency 0: what the thesis, which gives no number, calls a "low amplitude" is surely not above this
-ALIKE = 0.05  # largest difference of spectra that are "very similar"
 NEGLIGIBLE = 0.005  # peaks below are not looked at
 _SAMPLES = 513  # of a filter, across
 
@@ -61,13 +62,16 @@ class Peak:
 
 def spectra_figure(display: Display, description: SubpixelDescription, folder: pathlib.Path) -> Figure:
     """One panel for each subpixel: magnitudes of its kernels over cycles per degree, and of its clamped analytic filter, dashed."""
-    layout, words = display.layout, subpixel_words(display.layout)
+    layout, shown = display.layout, shown_subpixels(display.layout)
+    words = [subpixel_words(layout)[i] for i in shown]
     title, nyquist = layout_title(layout.name), pixel_nyquist(description)
     rows, columns = panel_grid(len(words))
-    along = "" if layout.one_dimensional else ", along rows"
-    figure, panels = new_panels(rows, columns, 3.5 if rows == 1 else 0.5 + 2.6 * rows, f"{title}: spectra of the kernels{along}", sharex=True, sharey=True)
+    along = "" if layout.one_dimensional else ", down columns" if stands(layout) else ", along rows"
+    figure, panels = new_panels(
+        rows, columns, 3.5 if rows == 1 else 0.5 + 2.6 * rows, f"{title}: spectra of the kernels{along}", sharex=True, sharey=True
+    )
     found = peaks(display)
-    for subpixel, axes in enumerate(panels.ravel()[: len(words)]):
+    for subpixel, axes in zip(shown, panels.ravel(), strict=False):
         _draw_panel(axes, display, description, subpixel, [peak for peak in found if peak.subpixel == subpixel_names(layout)[subpixel]])
     for axes in panels.ravel()[len(words) :]:
         axes.set_axis_off()
@@ -76,7 +80,7 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
     for axes in panels[-1]:
         axes.set_xlabel("frequency (cycles per degree)", fontsize=9)
     panels[0, 0].set_xlim(0.0, min(SHOWN * nyquist, float(spectrum(display.kernels, 0)[0][-1])))
-    analytic = [clamped_spectrum(display, description, i, np.linspace(0.0, nyquist, 101)).max() for i in range(len(words))]
+    analytic = [clamped_spectrum(display, description, i, np.linspace(0.0, nyquist, 101)).max() for i in shown]
     panels[0, 0].set_ylim(0.0, 1.06 * max(1.0, *(peak.magnitude for peak in found), *analytic))
     if len(layout.primaries) > 3:
         room(panels[0, 0], 2, 2.1)
@@ -84,39 +88,47 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
     file = save_panels(figure, folder / f"spectra_{layout.name}.png")
 
     agreement, comparison = compared(display, description, found)
-    cut = "" if layout.one_dimensional else " The section through the two-dimensional spectra at vertical frequency 0 is shown."
+    cut = "" if layout.one_dimensional else f" The section through the two-dimensional spectra{along} is shown."
     return Figure(
         name=f"spectra_{layout.name}",
         title=f"Spectra of the kernels of {title}",
         file=file,
-        alt=f"{len(words)} charts of magnitude over frequency, one for each subpixel ({listed(list(words))}): a low-pass curve from the subpixel's own "
+        alt=f"{len(words)} charts of magnitude over frequency, one for each subpixel ({listed(words)}): a low-pass curve from the subpixel's own "
         "channel, and the curves of the other channels, each with a dot at its peak.",
-        caption=f"How strongly each subpixel of {title} follows a wave of each frequency in the red, green and blue of the image; solid: the solved kernels, "
-        f"with a dot at the peak of those from other channels; dashed: the analytic filter, ended at zero number {description.zeros} of its sinc and "
-        f"normalized.{cut} Gray line: the pixel Nyquist frequency. {settings(description)}.",
-        thesis="Fig. 4.4 and section 4.3.3, for the RGB stripe: each subpixel has a low-pass kernel, from its own channel, and two band-pass ones that peak "
-        "at about 16 cycles per degree, in a narrow band and with a low amplitude, so that they hardly contribute and may be left out."
+        caption=f"How strongly each subpixel of {title} follows a wave of each frequency in the red, green and blue of the image; solid: the solved "
+        f"kernels, with a dot at the peak of those from other channels; dashed: the analytic filter, ended at zero number {description.zeros} of "
+        f"its sinc and normalized.{cut}{choice(layout)} Gray line: the pixel Nyquist frequency. {settings(description)}.",
+        thesis="Fig. 4.4 and section 4.3.3, for the RGB stripe: each subpixel has a low-pass kernel, from its own channel, and two band-pass ones "
+        "that peak at about 16 cycles per degree, in a narrow band and with a low amplitude, so that they hardly contribute and may be left out."
         if family(layout) == "RGB"
-        else "The thesis shows spectra of all kernels only for the RGB stripe (Fig. 4.4)."
-        + (" Of RGBG, Fig. 4.6 shows those of the low-pass kernels: red and blue are nearly alike." if family(layout) == "RGBG" else ""),
+        else "The thesis shows spectra of all kernels only for the RGB stripe (Fig. 4.4).",
         agreement=agreement,
         comparison=comparison,
     )
 
 
+def stands(layout: Layout) -> bool:
+    """Whether subpixels stand one above the other and nowhere side by side."""
+    return layout.pattern.shape[1] == 1 and layout.cells[0] == 1
+
+
 def spectrum(kernels: Kernels, subpixel: int) -> tuple[F64, F64]:
-    """Frequencies along rows, cycles per degree (n,), and there the magnitudes of a subpixel's kernels, float64 (primaries, n)."""
-    magnitude = np.abs(np.fft.rfft(kernels.h[subpixel].sum(axis=1), axis=-1))  # of kernels summed down: the section at vertical frequency 0
-    return np.arange(magnitude.shape[-1]) * kernels.step[1], np.asarray(magnitude, np.float64)
+    """Frequencies, cycles per degree (n,), and there the magnitudes of a subpixel's kernels, float64 (primaries, n).
+
+    They are those along rows, or down columns of displays whose subpixels stand one above the other; the frequency across them is 0.
+    """
+    down = stands(kernels.layout)
+    magnitude = np.abs(np.fft.rfft(kernels.h[subpixel].sum(axis=2 if down else 1), axis=-1))  # of kernels summed across: the section
+    return np.arange(magnitude.shape[-1]) * np.float64(kernels.step[0 if down else 1]), np.asarray(magnitude, np.float64)
 
 
 def clamped_spectrum(display: Display, description: SubpixelDescription, subpixel: int, frequency: F64) -> F64:
-    """The magnitude of a subpixel's clamped and normalized analytic filter at frequencies along rows, cycles per degree."""
+    """The magnitude of a subpixel's clamped and normalized analytic filter at frequencies in cycles per degree, along the same direction."""
     fit, layout = display.fits[subpixel], display.layout
-    filter = fit.reconstruction(layout, description.zeros)
+    below = fit.reconstruction_down(layout, description.zeros)
+    filter = below if below is not None and stands(layout) else fit.reconstruction(layout, description.zeros)
     x = np.linspace(-filter.radius, filter.radius, _SAMPLES)
-    radial = fit.reconstruction_down(layout, description.zeros) is None
-    weight = filter.weight(np.hypot(x[:, None], x)).sum(axis=0) if radial else filter.weight(x)
+    weight = filter.weight(np.hypot(x[:, None], x)).sum(axis=0) if below is None else filter.weight(x)
     wave = np.cos(2 * np.pi * frequency[:, None] * description.viewing.degrees_per_pixel * x)
     return np.asarray(np.abs(wave @ weight) / abs(weight.sum()), np.float64)
 
@@ -143,14 +155,12 @@ def compared(display: Display, description: SubpixelDescription, found: list[Pea
     frequencies = [peak.frequency for peak in cross]
     highest, lowest = max(cross, key=lambda peak: peak.magnitude), min(cross, key=lambda peak: peak.magnitude)
     text = (
-        f"The kernels from a subpixel's own channel pass {_range([p.at_zero for p in own], '.3f')} of a constant image; those "
-        f"from other channels pass at most {max(p.at_zero for p in cross):.2g}, and peak at {_range(frequencies, '.1f')} cpd (pixel Nyquist frequency "
+        f"The kernels from a subpixel's own channel pass {_range([p.at_zero for p in own], '.3f')} of a constant image; those from other channels "
+        f"pass at most {max(p.at_zero for p in cross):.2g}, and peak at {_range(frequencies, '.1f')} cpd (pixel Nyquist frequency "
         f"{pixel_nyquist(description):.3g} cpd). The highest of these peaks is {highest.magnitude:.2f}, from {PRIMARY_WORDS[highest.primary]} on "
         f"{highest.subpixel}, half as high over a band of {_band(display, highest):.2g} cpd; the lowest is {lowest.magnitude:.2g}, from "
         f"{PRIMARY_WORDS[lowest.primary]} on {lowest.subpixel}."
     )
-    if family(display.layout) == "RGBG":
-        return _red_and_blue(display, text)
     if family(display.layout) != "RGB":
         return "not comparable", text
     if not same_viewer(description):
@@ -181,15 +191,6 @@ def _band(display: Display, peak: Peak) -> float:
     return float(high * (frequency[1] - frequency[0]))
 
 
-def _red_and_blue(display: Display, text: str) -> tuple[Agreement, str]:
-    """How alike the low-pass kernels of red and blue are."""
-    spectra = [spectrum(display.kernels, letters(display.layout).index(letter))[1][i] for letter, i in (("R", 0), ("B", 2))]
-    difference = float(np.abs(spectra[0] - spectra[1]).max())
-    holds = difference <= ALIKE
-    text += f" The low-pass spectra of red and blue differ by at most {difference:.2g} (nearly alike: at most {ALIKE:g})."
-    return ("agrees" if holds else "differs"), text
-
-
 def _draw_panel(axes: "Axes", display: Display, description: SubpixelDescription, subpixel: int, found: list[Peak]) -> None:
     """One subpixel's spectra."""
     layout, nyquist = display.layout, pixel_nyquist(description)
@@ -202,6 +203,10 @@ def _draw_panel(axes: "Axes", display: Display, description: SubpixelDescription
             axes.plot([peak.frequency], [peak.magnitude], "o", color=color, markersize=5, markeredgecolor="white", markeredgewidth=0.8, zorder=5)
     fine = np.linspace(0.0, min(SHOWN * nyquist, frequency[-1]), 301)
     axes.plot(fine, clamped_spectrum(display, description, subpixel, fine), "--", color=INK, linewidth=1.0, dashes=(4, 2), zorder=6)
-    panel_title(axes, f"{subpixel_names(layout)[subpixel]}: {subpixel_words(layout)[subpixel]} subpixel", PRIMARY_COLORS[next(p.primary for p in found if p.own)])
+    panel_title(
+        axes,
+        f"{subpixel_names(layout)[subpixel]}: {subpixel_words(layout)[subpixel]} subpixel",
+        PRIMARY_COLORS[next(p.primary for p in found if p.own)],
+    )
     lines = [(f"{PRIMARY_WORDS[p.primary]} {p.magnitude:.2f} at {p.frequency:.3g} cpd", PRIMARY_COLORS[p.primary]) for p in found]
     colored_lines(axes, lines, right=True, columns=2 if len(lines) > 3 else 1)

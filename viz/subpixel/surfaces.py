@@ -12,7 +12,20 @@ from viz.charts import INK
 from viz.report.subpixel import layout_title
 from viz.subpixel.figure import Figure
 from viz.subpixel.fits import compared_fits, display_rows, family
-from viz.subpixel.look import PRIMARY_COLORS, letters, listed, new_panels, panel_grid, panel_title, save_panels, settings, subpixel_names, subpixel_words
+from viz.subpixel.look import (
+    PRIMARY_COLORS,
+    choice,
+    letters,
+    listed,
+    new_panels,
+    panel_grid,
+    panel_title,
+    save_panels,
+    settings,
+    shown_subpixels,
+    subpixel_names,
+    subpixel_words,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,15 +39,18 @@ _LEVELS = (0.02, 0.1, 0.5)  # of the largest value: where the fit's contour line
 
 def surfaces_figure(display: Display, description: SubpixelDescription, folder: pathlib.Path) -> Figure:
     """One map for each subpixel: its own kernel in colors, the analytic filter as contour lines."""
-    layout, words, kernels = display.layout, subpixel_words(display.layout), display.kernels
+    layout, kernels, shown = display.layout, display.kernels, shown_subpixels(display.layout)
+    words = [subpixel_words(layout)[i] for i in shown]
     title = layout_title(layout.name)
-    rows_at, columns_at = (_shown(at) for at in (kernels.rows_at, kernels.columns_at))
-    own = np.stack([kernels.own(i)[np.ix_(rows_at, columns_at)] for i in range(len(words))])
-    largest = float(np.abs(own).max())
+    rows_at, columns_at = (_near(at) for at in (kernels.rows_at, kernels.columns_at))
+    own = {i: kernels.own(i)[np.ix_(rows_at, columns_at)] for i in shown}
+    largest = max(float(np.abs(values).max()) for values in own.values())
     rows, columns = panel_grid(len(words))
-    figure, panels = new_panels(rows, columns, 0.9 + 3.2 * rows, f"{title}: low-pass kernels, and the analytic filters as contour lines", sharex=True, sharey=True)
+    figure, panels = new_panels(
+        rows, columns, 0.9 + 3.2 * rows, f"{title}: low-pass kernels, and the analytic filters as contour lines", sharex=True, sharey=True
+    )
     image = None
-    for i, axes in enumerate(panels.ravel()[: len(words)]):
+    for i, axes in zip(shown, panels.ravel(), strict=False):
         image = _draw_map(axes, display, i, own[i], kernels.rows_at[rows_at], kernels.columns_at[columns_at], largest)
     for axes in panels.ravel()[len(words) :]:
         axes.set_axis_off()
@@ -55,12 +71,13 @@ def surfaces_figure(display: Display, description: SubpixelDescription, folder: 
         name=f"surfaces_{layout.name}",
         title=f"Two-dimensional kernels of {title}",
         file=file,
-        alt=f"{len(words)} maps, one for each subpixel ({listed(list(words))}): a bright peak of {largest:.2g} in the middle, surrounded by weak negative rings.",
-        caption=f"What each subpixel of {title} takes from its own channel of the image around it. Colors: the solved kernel, on a scale that is linear up to "
-        f"{LINEAR * largest:.2g} and logarithmic beyond. Lines: the fitted Gaussian-windowed sinc, here a {shape.get(applied[0].model, 'function')}, at "
-        f"{levels} of the largest value, dashed where negative. Root mean square errors of the fits: {quality}. {settings(description)}.",
-        thesis="Fig. 4.7 and section 4.3.5: the low-pass kernels of 2-D RGBW have the overall shape of those in Fig. 4.3, and are approximated by a radial "
-        "Gaussian-windowed sinc (Eq. 4.13) with the parameters of Table 4.1."
+        alt=f"{len(words)} maps, one for each subpixel ({listed(words)}): the largest weight is {largest:.2g}, in the middle.",
+        caption=f"What each subpixel of {title} takes from its own channel of the image around it. Colors: the solved kernel, on a scale that is "
+        f"linear up to {LINEAR * largest:.2g} and logarithmic beyond. Lines: the fitted Gaussian-windowed sinc, here a "
+        f"{shape.get(applied[0].model, 'function')}, at {levels} of the largest value, dashed where negative. Root mean square errors of the fits: "
+        f"{quality}.{choice(layout)} {settings(description)}.",
+        thesis="Fig. 4.7 and section 4.3.5: the low-pass kernels of 2-D RGBW have the overall shape of those in Fig. 4.3, and are approximated by "
+        "a radial Gaussian-windowed sinc (Eq. 4.13) with the parameters of Table 4.1."
         if family(layout) == "RGBW"
         else "Fig. 4.7 shows 2-D RGBW alone.",
         agreement=agreement,
@@ -68,7 +85,7 @@ def surfaces_figure(display: Display, description: SubpixelDescription, folder: 
     )
 
 
-def _shown(at: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _near(at: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     """Which offsets are near enough to be shown."""
     return np.flatnonzero(np.abs(at) <= REACH)
 
@@ -85,7 +102,7 @@ def _draw_map(
     axes.set_aspect(display.layout.cells[0] / display.layout.cells[1])
 
     # The fit, on a fine grid
-    across, down = np.meshgrid(np.linspace(left, right, 241), np.linspace(top, bottom, 241))
+    across, down = np.meshgrid(np.linspace(left, right, 131), np.linspace(top, bottom, 131))
     values = display.fits[subpixel].values(across, down)
     levels = [-level * largest for level in reversed(_LEVELS)] + [level * largest for level in _LEVELS]
     axes.contour(across, down, values, levels=levels, colors=INK, linewidths=0.8, linestyles=["--"] * len(_LEVELS) + ["-"] * len(_LEVELS))

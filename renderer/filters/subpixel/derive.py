@@ -22,8 +22,10 @@ C128 = npt.NDArray[np.complex128]
 RANK_TOLERANCE = 1e-7  # singular values below this share of a residue's largest are zero: the square root of what A^-1 in float64 can tell apart
 ILL_CONDITIONED = 1e5  # of a residue's system: its solution loses five digits
 LARGE_GAIN = 12.0  # of kernels: the shipped displays have 2.5 to 6.1
+LARGE_DRIVE = 1.05  # of white: what is above 1 is clipped
 LARGE_TINT = 0.02  # of white: the shipped displays have 0.01 or less
 PIXELS_1D, PIXELS_2D = 100, 24  # how many pixels the signal is long, about: 300 positions of an RGB stripe, as in the thesis
+MOST_VALUES = 8_000_000  # of all kernels: large patterns in two dimensions have shorter signals
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +33,8 @@ class Kernels:
     """All kernels of a layout: α_i = Σ_d Σ_o h_{p,d}(o) γ_{i+o,d}, where p is the subpixel of ``layout.active`` at position i.
 
     ``h``: float64 (subpixels, primaries, rows, columns), for the offsets ``rows_at`` (rows) and ``columns_at`` (columns), in positions, ascending;
-    1-D layouts have one row. ``condition``: the largest ratio of singular values of a residue's system (that of A is its square), without
-    those that count as zero. ``deficient``: how many residues' systems are singular, of ``residues``; their solutions are the smallest ones
+    1-D layouts have one row. ``condition``: the largest ratio of singular values of a residue's system (of its part of A it is the square),
+    without those that count as zero. ``deficient``: how many residues' systems are singular, of ``residues``; their solutions are the smallest ones
     (truncated pseudo-inverse). ``open``: the lowest and the highest frequency, cycles per degree, that such residues begin at; ``unseen``: how
     many of them have no weight at all. ``step``: cycles per degree between neighboring frequencies, along rows and columns.
 
@@ -40,7 +42,8 @@ class Kernels:
     above 0 as well. The sums of the kernels trade an error there against one at 0, in the ratio of their weights. Where the pattern repeats in
     every pixel that ratio is small (stripes at the default viewing: sums are 1 and 0 to 1e-5). The red of RGBG repeats in every other, the ratio
     is 1e-3, sums are 0.996 for red and blue, and gray comes out 0.9 % short of red. That is the recipe's optimum, not an error of its
-    solution. With W, one color has many mixtures: rows do not sum to 1 and 0, but the light of a gray image is gray.
+    solution. With W, one color has many mixtures: rows do not sum to 1 and 0, but the light of a gray image is gray:
+    for RGBW it comes to a quarter from R, G and B and drives W to 1.3 of the gray, which clips where the gray is above 0.77.
     """
 
     layout: Layout
@@ -74,8 +77,12 @@ class Kernels:
     def white(self) -> F64:
         """The color that a white image, and in proportion every gray one, is shown with: linear R, G, B."""
         primaries = self.layout.active_primaries
-        drive = self.h.sum(axis=(2, 3)) @ self.layout.signal(np.ones(3))
-        return np.asarray(self.layout.light().T @ (np.bincount(primaries, drive) / np.bincount(primaries)), np.float64)
+        return np.asarray(self.layout.light().T @ (np.bincount(primaries, self.white_drive) / np.bincount(primaries)), np.float64)
+
+    @property
+    def white_drive(self) -> F64:
+        """What a white image drives each subpixel of ``layout.active`` to."""
+        return np.asarray(self.h.sum(axis=(2, 3)) @ self.layout.signal(np.ones(3)), np.float64)
 
     def warnings(self) -> tuple[str, ...]:
         """What is to be said about the solution: which frequencies leave it open, why, and what was done. Nothing where it is the only one."""
@@ -89,6 +96,9 @@ class Kernels:
                 f"{name}: the kernels drive subpixels to as much as {self.gain:.0f} times the signal, and displays clip that: the sensitivity "
                 f"`{self.sensitivity.name}` counts some errors so little that they grow large for the sake of others."
             )
+        if self.white_drive.max() > LARGE_DRIVE:
+            primary = self.layout.primaries[self.layout.active_primaries[self.white_drive.argmax()]]
+            found.append(f"{name}: white drives {primary} to {self.white_drive.max():.2f}, of which displays clip what is above 1: white is dimmed.")
         if np.abs(self.white - 1.0).max() > LARGE_TINT:
             red, green, blue = self.white
             found.append(
@@ -148,7 +158,7 @@ def derive(layout: Layout, viewing: Viewing | None = None, sensitivity: Sensitiv
     # a holds the spectra over periods: back to positions, then from (subpixel <- impulse) to offsets
     a = a.reshape(f.shape[0], f.shape[1], len(active), len(layout.primaries), len(at))
     response = np.fft.ifft2(a, axes=(0, 1)).real  # (periods down, periods across, subpixels, primaries, impulses)
-    h, rows_at, columns_at = _by_offset(response, layout, at, rows, columns)
+    h, rows_at, columns_at = _by_offset(response, layout, rows, columns)
     unseen = int((rank == 0).sum())
     return Kernels(layout, viewing, sensitivity, h, rows_at, columns_at, condition, len(begins), residues, step, singular, unseen)
 
@@ -156,7 +166,8 @@ def derive(layout: Layout, viewing: Viewing | None = None, sensitivity: Sensitiv
 def default_size(layout: Layout) -> tuple[int, int]:
     """How many positions, (rows, columns), the signal of a derivation has unless it is given."""
     rows, columns = layout.pattern.shape
-    pixels = PIXELS_1D if layout.one_dimensional else PIXELS_2D
+    most = math.sqrt(MOST_VALUES / (layout.cells[0] * layout.cells[1] * len(layout.active) * len(layout.primaries)))
+    pixels = PIXELS_1D if layout.one_dimensional else min(PIXELS_2D, most)
     across = columns * max(1, round(pixels * layout.cells[0] / columns))
     return 1 if layout.one_dimensional else rows * max(1, round(pixels * layout.cells[1] / rows)), across
 
@@ -182,18 +193,18 @@ def _solve(g: C128, wanted: C128) -> tuple[C128, float, npt.NDArray[np.int64]]:
     return a, float((s[:, 0] / np.where(rank > 0, smallest, 1.0)).max()), rank
 
 
-def _by_offset(
-    response: F64, layout: Layout, at: npt.NDArray[np.int64], rows: int, columns: int
-) -> tuple[F64, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _by_offset(response: F64, layout: Layout, rows: int, columns: int) -> tuple[F64, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """h_{p,d}(o) of the responses of all subpixels to impulses at the positions of one period."""
     pattern_rows, pattern_columns = layout.pattern.shape
     down, across, subpixels, primaries, _ = response.shape
+
+    # Period y, impulse k: the impulse is k - y P behind the first period, which, with y counted backward, is where it stands in the signal
+    backward = response[-np.arange(down) % down][:, -np.arange(across) % across]
+    backward = backward.reshape(down, across, subpixels, primaries, pattern_rows, pattern_columns)
+    h = np.ascontiguousarray(backward.transpose(2, 3, 0, 4, 1, 5)).reshape(subpixels, primaries, rows, columns)
+
+    # From there to offsets from the subpixel, the lowest first
     low_row, low_column = -(rows // 2), -(columns // 2)
-    h = np.zeros((subpixels, primaries, rows, columns))
-    period_row, period_column = np.arange(down) * pattern_rows, np.arange(across) * pattern_columns
     for p, (row, column) in enumerate(layout.active):
-        for k, (impulse_row, impulse_column) in enumerate(at):
-            offset_row = (impulse_row - row - period_row - low_row) % rows
-            offset_column = (impulse_column - column - period_column - low_column) % columns
-            h[p][:, offset_row[:, None], offset_column] = np.moveaxis(response[:, :, p, :, k], 2, 0)
+        h[p] = np.roll(h[p], (-row - low_row, -column - low_column), axis=(1, 2))
     return h, low_row + np.arange(rows), low_column + np.arange(columns)

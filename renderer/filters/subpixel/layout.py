@@ -58,6 +58,8 @@ class Layout:
             raise ValueError(f"{self.name}: expected a finite origin, found {self.origin}")
         if self.opponent.shape != (3, len(self.primaries)) or not np.isfinite(self.opponent).all():
             raise ValueError(f"{self.name}: expected an opponent matrix of 3 rows and {len(self.primaries)} finite columns")
+        if len(self.primaries) > 3 and not (self.opponent[0, :3].sum() > 0 and self.opponent[0, 3] > 0):
+            raise ValueError(f"{self.name}: expected an opponent matrix in which W has a luminance, and R, G and B together have one")
         if len(self.extent) != len(self.primaries) or min(min(size) for size in self.extent) < 1:
             raise ValueError(f"{self.name}: expected a width and a height of each primary, 1 or more")
 
@@ -97,11 +99,12 @@ class Layout:
     def signal(self, rgb: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
         """The image signal γ of linear colors, (…, 3): for R, G, B itself, (…, 3); with W, (…, 4).
 
-        What is white in a color, min(R, G, B), is W's; W emits κ of it, so κ of it is taken from R, G and B, which keeps the color.
+        What is white in a color, min(R, G, B), is W's; W emits κ of it, so κ of it is taken from R, G and B, which keeps the color. A W that is
+        brighter than R, G and B together needs but 1 / κ of it.
         """
         if len(self.primaries) < 4:
             return rgb
-        white = rgb.min(axis=-1, keepdims=True)
+        white = rgb.min(axis=-1, keepdims=True) / rgb.dtype.type(max(1.0, self.white_share))
         return np.concatenate([rgb - rgb.dtype.type(self.white_share) * white, white], axis=-1)
 
     def light(self) -> F64:

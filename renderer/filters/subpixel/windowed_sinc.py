@@ -167,11 +167,10 @@ def _starts(model: Model, spacing: float) -> list[list[float]]:
 def _least_squares(residual: Callable[[Sequence[float]], F64], starts: list[list[float]]) -> list[float]:
     from scipy.optimize import least_squares
 
-    found = []
-    for start in starts:
-        lowest = [LEAST_A, 0.0] * (len(start) // 2)
-        found.append(least_squares(residual, start, bounds=(lowest, [np.inf] * len(start)), x_scale=start, max_nfev=100))  # type: ignore[arg-type]
-    return [float(v) for v in min(found, key=lambda one: float(one.cost)).x]
+    start = min(starts, key=lambda values: float((residual(values) ** 2).sum()))
+    bounds = ([LEAST_A, 0.0] * (len(start) // 2), [np.inf] * len(start))
+    found = least_squares(residual, start, bounds=bounds, x_scale=start, max_nfev=100)  # type: ignore[arg-type]
+    return [float(v) for v in found.x]
 
 
 def _warning(kernels: Kernels, subpixel: int, found: list[float], relative: float) -> str:

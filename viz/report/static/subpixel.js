@@ -1,9 +1,10 @@
-// Views of subpixels begin in the middle, move together, and can be dragged.
+// Views of subpixels begin where there is most to see, move together, and can be dragged.
 (() => {
   'use strict';
 
   const views = [...document.querySelectorAll('.closely')];
   const room = (view) => [view.scrollWidth - view.clientWidth, view.scrollHeight - view.clientHeight];
+  const start = document.getElementById('pictures')?.dataset;
   let leader = null;
 
   function follow(view) {
@@ -33,7 +34,7 @@
   }
 
   views.forEach((view) => {
-    view.scrollTo(room(view)[0] / 2, room(view)[1] / 2);
+    view.scrollTo(start.x - view.clientWidth / 2, start.y - view.clientHeight / 2);
     ['pointerenter', 'pointerdown', 'focus', 'touchstart'].forEach((kind) => view.addEventListener(kind, () => { leader = view; }, { passive: true }));
     view.addEventListener('scroll', () => follow(view), { passive: true });
     drag(view);
