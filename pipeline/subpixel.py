@@ -87,28 +87,34 @@ def _refuse_foreign(folder: pathlib.Path) -> None:
 
 
 def _write_display(analysis: "Analysis", display: "Display", work: pathlib.Path) -> "list[Picture]":
-    """The drive of a display as numbers and as pictures."""
+    """The drive of a display as numbers and as a picture; what it shows by the asked method, and then by a box for each pixel, the standard."""
     from queries.subpixel.display import drive_picture, subpixel_picture
     from renderer.filters.subpixel.methods import TITLES
+    from viz.numbers import percent
     from viz.pictures import write_png
     from viz.report import Picture
     from viz.report.subpixel import layout_title
 
-    layout, method = display.layout, TITLES[analysis.description.method]
-    (work / "pictures").mkdir(exist_ok=True)
-    known = {"layout": layout.name, "method": analysis.description.method, "source": analysis.name}
-    write_plane(work / "images" / f"{layout.name}.exr", display.lattice, known)
-    shown, (width, height) = work / "pictures" / f"{layout.name}.png", analysis.size
-    write_png(shown, subpixel_picture(display.lattice, layout))
-    title = layout_title(layout.name)
-    words = f"{analysis.name} on {title}, {method}: {width} × {height} pixels, subpixels in their colors, {100 * display.clipped:.3g} % clipped."
-    pictures = [Picture(f"{title}: {method}", words, words, shown, files={"exr": work / "images" / f"{layout.name}.exr"})]
+    layout, method, pictures = display.layout, analysis.description.method, work / "pictures"
+    pictures.mkdir(exist_ok=True)
+    files = {"exr": work / "images" / f"{layout.name}.exr"}
+    write_plane(files["exr"], display.lattice, {"layout": layout.name, "method": method, "source": analysis.name})
     drive = drive_picture(display.lattice, layout)
     if drive is not None:
-        write_png(work / "pictures" / f"{layout.name}-drive.png", drive)
-        words = f"What to send to {title}: an image of {width} × {height} pixels, whose R, G and B drive the subpixels."
-        pictures.append(Picture(f"{title}: drive", words, words, work / "pictures" / f"{layout.name}-drive.png"))
-    return pictures
+        files["drive"] = pictures / f"{layout.name}-drive.png"
+        write_png(files["drive"], drive)
+
+    # What is seen through a magnifying glass
+    clipped = f"{percent(display.clipped)} of the subpixels should be darker than black or brighter than they can be, and are clipped."
+    shown = [(layout.name, TITLES[method], display.lattice, clipped, files)]
+    if method != "pixel_box":
+        shown.append((f"{layout.name}-standard", TITLES["pixel_box"], display.standard, "Standard filtering: one color for each pixel.", {}))
+    title, (width, height), found = layout_title(layout.name), analysis.size, []
+    for name, by, lattice, caption, belonging in shown:
+        write_png(pictures / f"{name}.png", subpixel_picture(lattice, layout))
+        alt = f"{analysis.name} on {title}, {by}: {width} × {height} pixels, subpixels in their colors."
+        found.append(Picture(f"{title}: {by}", caption, alt, pictures / f"{name}.png", files=belonging))
+    return found
 
 
 def _write_tables(analysis: "Analysis", work: pathlib.Path) -> None:

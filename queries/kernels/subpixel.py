@@ -18,47 +18,80 @@ from queries.kernel import kernel
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
+Walks = npt.NDArray[np.unsignedinteger]
+Chosen = npt.NDArray[np.bool_]
+Lanes = tuple[int, ...]  # as many as subpixels are reached: kernels are compiled for that number
 UNSIGNED = np.uint64
+
+
+@kernel
+def add_to_row(
+    x: np.float64, r: np.float64, g: np.float64, b: np.float64, begin: int, pixels: np.uint32, phases: int, across: F64, first: I64, shows: F64,
+    turns: int, values: F64, totals: F64, lanes: Lanes,
+) -> None:  # fmt: skip
+    """Add one sample to the subpixels of a row of pixels, whose first period's sums begin at ``begin``."""
+    reach = UNSIGNED(len(lanes))
+    pixel = np.int64(x)
+    turn = np.int64(np.uint32(pixel) // pixels)
+    column = UNSIGNED(pixel - turn * pixels)
+
+    # Where the tables have this phase, and where the sums begin
+    at = (x - pixel) * phases
+    phase = np.int64(at)
+    share = at - phase
+    start = (column * UNSIGNED(phases) + UNSIGNED(phase)) * UNSIGNED(2) * reach
+    change = start + reach
+    red = column * UNSIGNED(3) * reach
+    green, blue = red + reach, red + UNSIGNED(2) * reach
+    to = UNSIGNED(begin + turn * turns + first[column])
+
+    # All in one loop of known length, which becomes a few vector instructions
+    for k in range(len(lanes)):
+        w = across[start + UNSIGNED(k)] + share * across[change + UNSIGNED(k)]
+        values[to + UNSIGNED(k)] += w * (r * shows[red + UNSIGNED(k)] + g * shows[green + UNSIGNED(k)] + b * shows[blue + UNSIGNED(k)])
+        totals[to + UNSIGNED(k)] += w
 
 
 @kernel
 def splat_rows(
     x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, phases: int, across: F64, first: I64, shows: F64,
-    weights: F64, rows: int, columns: int, values: F64, totals: F64,
+    lanes: Lanes, rows: int, columns: int, values: F64, totals: F64,
 ) -> None:  # fmt: skip
     """Add samples to the subpixels of their own row of pixels, one channel each.
 
     All arrays are flat, ``values`` and ``totals`` of ``rows`` rows of ``columns``: with indices that cannot be negative, this is half as fast again.
-    ``period``: subpixels of one period; ``weights``: scratch, ``reach`` entries.
+    ``period``: subpixels of one period.
     """
-    pixels, turns, reach = np.uint32(len(first)), period[0], UNSIGNED(len(weights))
+    pixels, turns = np.uint32(len(first)), period[0]
     for i in range(len(x)):
-        if not (x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height):
-            continue
-        pixel, row = np.int64(x[i]), np.int64(y[i]) - first_row
-        if row < 0 or row >= rows:
-            continue
-        turn = np.int64(np.uint32(pixel) // pixels)
-        column = UNSIGNED(pixel - turn * pixels)
+        if x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height:
+            row = np.int64(y[i]) - first_row
+            if row >= 0 and row < rows:
+                r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
+                begin = row * columns + pad
+                add_to_row(np.float64(x[i]), r, g, b, begin, pixels, phases, across, first, shows, turns, values, totals, lanes)
 
-        # The weights of all subpixels in reach
-        at = (np.float64(x[i]) - pixel) * phases
-        phase = np.int64(at)
-        share = at - phase
-        start = (column * UNSIGNED(phases) + UNSIGNED(phase)) * UNSIGNED(2) * reach
-        change = start + reach
-        for k in range(reach):
-            weights[k] = across[start + k] + share * across[change + k]
 
-        # What each of them shows, and the weights
-        to = UNSIGNED(row * columns + pad + turn * turns + first[column])
-        red = column * UNSIGNED(3) * reach
-        green, blue = red + reach, red + UNSIGNED(2) * reach
-        r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
-        for k in range(reach):
-            values[to + k] += weights[k] * (r * shows[red + k] + g * shows[green + k] + b * shows[blue + k])
-        for k in range(reach):
-            totals[to + k] += weights[k]
+@kernel
+def splat_walks(
+    walk: Walks, chosen: Chosen, x: F32, y: F32, red: F32, green: F32, blue: F32, width: int, height: int, first_row: int, pad: int, period: I64,
+    phases: int, across: F64, first: I64, shows: F64, lanes: Lanes, rows: int, columns: int, values: F64, totals: F64,
+) -> None:  # fmt: skip
+    """The same for rows of ``paths``: a walk's rows lie together and are one sample, of which the chosen rows are the color."""
+    pixels, turns = np.uint32(len(first)), period[0]
+    i, n = 0, len(walk)
+    while i < n:
+        place, this, r, g, b = i, walk[i], np.float64(0.0), np.float64(0.0), np.float64(0.0)
+        while i < n and walk[i] == this:
+            if chosen[i]:
+                r += np.float64(red[i])
+                g += np.float64(green[i])
+                b += np.float64(blue[i])
+            i += 1
+        row = np.int64(y[place]) - first_row
+        if row >= 0 and row < rows:
+            begin = row * columns + pad
+            add_to_row(np.float64(x[place]), r, g, b, begin, pixels, phases, across, first, shows, turns, values, totals, lanes)
 
 
 @kernel

@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-from renderer.filters.subpixel.windowed_sinc import Fit
 
 from queries.subpixel.description import SubpixelDescription
+from queries.subpixel.reasons import Reason
 from renderer.filters.subpixel.derive import Kernels
 from renderer.filters.subpixel.layout import Layout
+from renderer.filters.subpixel.windowed_sinc import Fit
 
 F32 = npt.NDArray[np.float32]
 
@@ -48,5 +49,5 @@ class Analysis:
     scores: pa.Table | None = None
     methods: Mapping[str, pa.Table] = field(default_factory=dict)
     layouts: pa.Table | None = None
-    reasons: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)

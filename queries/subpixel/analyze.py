@@ -139,22 +139,34 @@ def analyze(source: Source, asked: SubpixelDescription) -> Analysis:
     derived = []
     with watch.part("derivation"):
         for name, layout in asked.displays().items():
-            kernels = derive(layout, asked.viewing, asked.sensitivity.sensitivity())
             try:
+                kernels = derive(layout, asked.viewing, asked.sensitivity.sensitivity())
                 derived.append(Derived(layout, kernels, fit(kernels)))
             except ValueError as error:
                 raise QueryError(f"layout `{name}`: {error}") from None
-    methods: tuple[Method, ...] = get_args(Method) if asked.evaluate else ()
+    kept: tuple[Method, ...] = ("pixel_box", asked.method)
+    methods: tuple[Method, ...] = get_args(Method) if asked.evaluate else kept
+    window = None
+    if asked.evaluate:
+        with watch.part("choice of the part to compare"):
+            window = _window(source, [one.layout for one in derived])
+
+    # Of all methods but those that are asked for, only the part that is compared stays in memory
     lattices: dict[tuple[str, Method], F32] = {}
+    parts: dict[tuple[str, Method], F32] = {}
     for display in derived:
-        for method in dict.fromkeys(("pixel_box", asked.method, *methods)):
+        for method in dict.fromkeys((*kept, *methods)):
             with watch.part(f"{display.layout.name}: {method}"):
-                lattices[display.layout.name, method] = source.lattice(method, display, asked.zeros)
+                lattice = source.lattice(method, display, asked.zeros)
+            if method in kept:
+                lattices[display.layout.name, method] = lattice
+            if window is not None:
+                parts[display.layout.name, method] = _part(lattice, display.layout, window)
     displays = tuple(_display(one, lattices, asked.method) for one in derived)
-    if not asked.evaluate:
+    if window is None:
         return Analysis(source.name, source.kind, asked, displays, source.size, seconds=watch.seconds)
     with watch.part("comparison"):
-        scores = _judged(source, asked, derived, lattices)
+        scores = _judged(source, asked, derived, window, parts)
         by_layout = {one.layout.name: methods_ranked(scores, one.layout.name) for one in derived}
         layouts = layouts_ranked(scores) if len(derived) > 1 else None
     return Analysis(source.name, source.kind, asked, displays, source.size, scores, by_layout, layouts, reasons(scores), watch.seconds)
@@ -166,17 +178,16 @@ def _display(derived: Derived, lattices: Mapping[tuple[str, Method], F32], metho
     return Display(layout, derived.kernels, derived.fits, lattice, lattices[layout.name, "pixel_box"], clipped_share(lattice, layout))
 
 
-def _judged(source: Source, asked: SubpixelDescription, derived: Sequence[Derived], lattices: Mapping[tuple[str, Method], F32]) -> pa.Table:
-    """The scores of all methods on all displays, for the project's test images and for a part of the source."""
+def _judged(
+    source: Source, asked: SubpixelDescription, derived: Sequence[Derived], window: Window, parts: Mapping[tuple[str, Method], F32]
+) -> pa.Table:
+    """The scores of all methods on all displays, for the project's test images and for a part of the source, of which ``parts`` has the lattices."""
     layouts = {one.layout.name: one.layout for one in derived}
     fine = fine_grid(layouts.values())
     pictures: dict[str, F32] = {name: target(name, *TARGET_SIZE, fine) for name in asked.targets}
-    window = _window(source, list(layouts.values()))
     shown = source.name if source.name not in pictures else f"{source.name} ({source.kind})"
-    pictures[shown] = np.clip(source.samples(fine, window), 0.0, 1.0)
-    given: dict[tuple[str, str, str], F32] = {
-        (shown, name, method): _part(lattice, layouts[name], window) for (name, method), lattice in lattices.items()
-    }
+    pictures[shown] = source.samples(fine, window)
+    given: dict[tuple[str, str, str], F32] = {(shown, name, method): part for (name, method), part in parts.items()}
     return judge(
         pictures,
         layouts,
@@ -197,10 +208,10 @@ def _window(source: Source, layouts: Sequence[Layout]) -> Window:
     down = math.lcm(*(layout.pattern.shape[0] // layout.cells[1] for layout in layouts))
     if width < across or height < down:
         raise QueryError(f"`{source.name}` is {width} x {height} pixels of the display, less than a period of its pattern: {across} x {down}")
-    size = (min(width, LARGEST_WINDOW[0]) // across * across, min(height, LARGEST_WINDOW[1]) // down * down)
+    size = tuple(max(most // period, 1) * period for most, period in zip(np.minimum((width, height), LARGEST_WINDOW).tolist(), (across, down)))
 
     # Changes between neighbors, summed over every window
-    pixels = luminance_of(np.clip(source.samples(1, (0, 0, width, height)).astype(np.float64), 0.0, 1.0))
+    pixels = luminance_of(np.clip(source.samples(1, (0, 0, width, height)), 0.0, 1.0))
     change = np.zeros(pixels.shape)
     change[1:] += np.abs(np.diff(pixels, axis=0))
     change[:, 1:] += np.abs(np.diff(pixels, axis=1))
@@ -212,9 +223,9 @@ def _window(source: Source, layouts: Sequence[Layout]) -> Window:
 
 
 def _part(lattice: F32, layout: Layout, window: Window) -> F32:
-    """A window of a lattice."""
+    """A copy of a window of a lattice."""
     (across, down), (left, top, right, bottom) = layout.cells, window
-    return lattice[top * down : bottom * down, left * across : right * across]
+    return lattice[top * down : bottom * down, left * across : right * across].copy()
 
 
 class _Watch:

@@ -68,9 +68,10 @@ class LayoutDescription(Part):
         primaries = PRIMARIES if any("W" in row for row in letters) else PRIMARIES[:3]
         pattern = np.array([[INACTIVE if letter == EMPTY else PRIMARIES.index(letter) for letter in row] for row in letters], np.int64)
         opponent = np.array(OPPONENT_RGBW if "W" in primaries else OPPONENT_RGB)
+        for key, named in (("opponent", self.opponent), ("extent", self.extent)):
+            if not named.keys() <= set(primaries):
+                raise ValueError(f"`{key}` names {', '.join(sorted(named.keys() - set(primaries)))}, which the pattern has not")
         for primary, column in self.opponent.items():
-            if primary not in primaries:
-                raise ValueError(f"`opponent` names {primary}, which the pattern has not")
             opponent[:, primaries.index(primary)] = column
         extent = tuple(self.extent.get(primary, (1, 1)) for primary in primaries)  # type: ignore[call-overload]
         return Layout(name, primaries, pattern, self.cells, self.origin, extent, opponent)

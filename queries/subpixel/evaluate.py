@@ -1,7 +1,8 @@
 """How well each method of filtering shows pictures on each display: by S-CIELAB, by the error that the kernels make least, and by what is clipped.
 
 A method is judged by the light of the display that it drives, as a viewer sees it from where the filters were derived for, beside the picture at full
-resolution. What a display cannot show is cut off first; the columns ``clipped`` and ``scielab_unclipped`` say what that does.
+resolution. What a display cannot show is cut off first, of the light and of the picture; the columns ``clipped`` and ``scielab_unclipped`` say what
+that does. Pictures brighter than white, as renders with a lamp in view, are filtered as they are.
 """
 
 import statistics
@@ -43,7 +44,7 @@ FIGURES = (
     Figure("chroma", REAL, "part of the S-CIELAB difference that is in color: mean of the length of (Δa*, Δb*)"),
     Figure("weighted_error", REAL, "error weighed by contrast sensitivity (thesis, Eq. 4.4) in units of the picture's own weighed energy, unclipped"),
     Figure("clipped", REAL, "share of subpixels that should be darker than black or brighter than they can be"),
-    Figure("scielab_unclipped", REAL, "mean S-CIELAB difference of a display that could show those too"),
+    Figure("scielab_unclipped", REAL, "mean S-CIELAB difference of a display that could show those too, to the picture as bright as it is"),
     Figure("seconds", REAL, "time of filtering on all cores, the display's and the viewer's part left out; none where the picture came filtered"),
 )
 
@@ -74,9 +75,9 @@ def judge(
 ) -> pa.Table:
     """One row for each layout, image and method, in that order; columns and their meanings: ``FIGURES``.
 
-    ``images``: pictures at full resolution, float32 (height * fine, width * fine, 3), linear RGB in [0, 1]: ``fine`` x ``fine`` samples for each
-    pixel of the display. ``kernels`` and ``fits`` by layout. ``given``: lattices that were filtered elsewhere, by (image, layout, method); those of a
-    part of a display begin where a period of its layout does. ``clock``: seconds.
+    ``images``: pictures at full resolution, float32 (height * fine, width * fine, 3), linear RGB, white at 1 and brighter where they are: ``fine`` x
+    ``fine`` samples for each pixel of the display. ``kernels`` and ``fits`` by layout. ``given``: lattices that were filtered elsewhere, by (image,
+    layout, method); those of a part of a display begin where a period of its layout does. ``clock``: seconds.
     Raises QueryError for unknown methods, pictures that hold no whole pixels, and lattices of other sizes.
     """
     chosen = _checked(images, layouts, methods, fine)
@@ -103,7 +104,7 @@ def judge(
     # What the viewer sees, one picture a thread
     degrees = viewing.degrees_per_pixel / fine
     with ThreadPoolExecutor(cores()) as pool:
-        seen = dict(zip(images, pool.map(lambda picture: appearance(picture, degrees), images.values())))
+        seen = dict(zip(images, pool.map(lambda picture: _Seen.of(picture, degrees), images.values())))
         pairs = [(layout, image) for layout in layouts for image in images]
         signals = dict(zip(pairs, pool.map(lambda pair: signal_of_image(images[pair[1]], layouts[pair[0]], fine, threads=1), pairs)))
 
@@ -117,11 +118,27 @@ def judge(
     return answer(FIGURES, columns | {figure.name: [row[figure.name] for row in figures] for figure in FIGURES[3:]})
 
 
-def _seen(lattice: F32, layout: Layout, reference: F32, degrees: float, fine: int) -> dict[str, float]:
-    """The figures of S-CIELAB of a lattice; ``reference``: the appearance of the picture."""
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What a viewer sees of a picture, float32 (rows, columns, 3): as far as light in [0, 1] can show it, and ``whole``."""
+
+    cut: F32
+    whole: F32
+
+    @classmethod
+    def of(cls, picture: F32, degrees: float) -> "_Seen":
+        """Both, which are one unless some of the picture is brighter than white."""
+        whole = appearance(picture, degrees)
+        inside = picture.min() >= 0.0 and picture.max() <= 1.0
+        return cls(whole if inside else appearance(np.clip(picture, 0.0, 1.0), degrees), whole)
+
+
+def _seen(lattice: F32, layout: Layout, reference: _Seen, degrees: float, fine: int) -> dict[str, float]:
+    """The figures of S-CIELAB of a lattice."""
     share = clipped_share(lattice, layout)
-    difference = summary(reference, appearance(shown(np.clip(lattice, 0.0, 1.0), layout, fine), degrees))
-    unclipped = difference.mean if share == 0.0 else summary(reference, appearance(shown(lattice, layout, fine), degrees)).mean
+    difference = summary(reference.cut, appearance(shown(np.clip(lattice, 0.0, 1.0), layout, fine), degrees))
+    same = share == 0.0 and reference.cut is reference.whole
+    unclipped = difference.mean if same else summary(reference.whole, appearance(shown(lattice, layout, fine), degrees)).mean
     return {
         "scielab": difference.mean,
         "scielab_95": difference.high,

@@ -152,7 +152,7 @@ def _ranked(found: _Values, kind: str, against: str, columns: Sequence[Figure]) 
         "difference_low": difference_low,
         "difference_high": difference_high,
         "verdict": verdicts,
-        "wins": (difference < 0.0).mean(axis=1),
+        "wins": (difference < -ROUNDING).mean(axis=1),
         "stability": (resampled == rank[:, None]).mean(axis=1),
         "images": np.full(len(rank), found.count),
     }
@@ -190,4 +190,4 @@ def _ranks(means: F64) -> I64:
 def _verdict(low: float, high: float, images: int) -> str:
     if images < FEWEST_IMAGES:
         return "too few images"
-    return "better" if high < 0.0 else "worse" if low > 0.0 else "not told apart"
+    return "better" if high < -ROUNDING else "worse" if low > ROUNDING else "not told apart"

@@ -5,6 +5,7 @@ costs beyond all solved kernels; and that it minimizes another measure than the 
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import pyarrow as pa
 
@@ -15,8 +16,17 @@ OPTIMAL, KERNELS = "optimal", "kernels"
 SMALL = 0.1  # parts of a loss below this share of it are not told
 
 
-def reasons(scores: pa.Table) -> tuple[str, ...]:
-    """A sentence or more for each layout and image on which another method has a smaller S-CIELAB difference than ``optimal``.
+@dataclass(frozen=True)
+class Reason:
+    """What is said, in sentences, of a ``layout`` and an ``image``."""
+
+    layout: str
+    image: str
+    text: str
+
+
+def reasons(scores: pa.Table) -> tuple[Reason, ...]:
+    """One for each layout and image on which another method has a smaller S-CIELAB difference than ``optimal``.
 
     ``scores``: the table of ``queries.subpixel.evaluate.judge``; in the order of its rows.
     """
@@ -24,13 +34,13 @@ def reasons(scores: pa.Table) -> tuple[str, ...]:
     for row in scores.to_pylist():
         found.setdefault((row["layout"], row["image"]), {})[row["method"]] = row
     return tuple(
-        _loss(layout, image, methods)
+        Reason(layout, image, _loss(methods))
         for (layout, image), methods in found.items()
         if OPTIMAL in methods and min(row["scielab"] for row in methods.values()) < methods[OPTIMAL]["scielab"]
     )
 
 
-def _loss(layout: str, image: str, methods: Mapping[str, Row]) -> str:
+def _loss(methods: Mapping[str, Row]) -> str:
     """Who wins, by how much, and why."""
     optimal = methods[OPTIMAL]
     winner = min(methods, key=lambda name: methods[name]["scielab"])
@@ -39,7 +49,7 @@ def _loss(layout: str, image: str, methods: Mapping[str, Row]) -> str:
     parts = [_parts(optimal, best), _clipping(optimal, best), _simplified(methods, winner), _measures(methods, winner)]
     return " ".join(
         [
-            f"{layout}, {image}: {TITLES[winner]} beats {TITLES[OPTIMAL]} by {_percent(share)} "
+            f"{TITLES[winner][:1].upper()}{TITLES[winner][1:]} beats {TITLES[OPTIMAL]} by {_percent(share)} "
             f"(S-CIELAB {_number(best['scielab'])} against {_number(optimal['scielab'])}).",
             *(part for part in parts if part),
         ]
@@ -105,7 +115,7 @@ def _measures(methods: Mapping[str, Row], winner: str) -> str:
 
 
 def _number(value: float) -> str:
-    return f"{value:.3g}"
+    return f"{value:#.3g}"
 
 
 def _percent(share: float) -> str:

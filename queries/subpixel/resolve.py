@@ -47,7 +47,8 @@ def resolve(
         if source.camera:
             weak = suspects(tables, sums[-1], opened.settings["passes"])
             if weak.any() and tables.signed:
-                weak &= sums[-1] <= LEAST_SHARE * _sum(sampled(opened, None), tables.magnitudes(), threads, weak.any(axis=1))[-1]
+                magnitudes = _sum(sampled(opened, None), tables.magnitudes(), threads, np.asarray(weak.any(axis=1)))
+                weak &= sums[-1] <= LEAST_SHARE * magnitudes[-1]
         else:
             sums[-1] = expected_weights(tables) * source.expected
             weak = sums[-1] <= 0

@@ -154,7 +154,7 @@ def _rows(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F6
     """Weights across alone."""
     across = _across_table(filter, reach)
     tables = (across.shape[2], across.ravel(), reach.first.ravel(), _shows(filter, reach).ravel())
-    return _Added(splat_rows, tables, (np.zeros(across.shape[-1]),), bool((across[..., 0, :] < 0).any()))
+    return _Added(splat_rows, (*tables, (0,) * across.shape[-1]), (), bool((across[..., 0, :] < 0).any()))
 
 
 def _separable(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:

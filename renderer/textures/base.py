@@ -34,6 +34,7 @@ class Pyramid(NamedTuple):
 class Memory(NamedTuple):
     """The last filtered color of each pixel, for walks that meet the same triangle there; a tracer's own."""
 
+    width: Any  # int64, of the film, pixels
     key: npt.NDArray[np.int64]  # (slots, 2) pixel, -1 for none; triangle and texture
     rgb: npt.NDArray[np.float32]  # (slots, 3)
 

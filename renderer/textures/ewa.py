@@ -363,7 +363,7 @@ def remembered(
         return average(ewa, textures, index, s, t, j, row, column)
     if what < 0:
         return average(ewa, textures, index, s, t, j, row, column)
-    pixel = (pixel_y << 16) + pixel_x
+    pixel = np.int64(pixel_y) * memory.width + np.int64(pixel_x)
     slot = pixel % memory.key.shape[0]
     if memory.key[slot, 0] != pixel or memory.key[slot, 1] != what:
         r, g, b = average(ewa, textures, index, s, t, j, row, column)

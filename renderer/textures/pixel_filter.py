@@ -153,5 +153,5 @@ def with_memory(arrays: SceneArrays) -> SceneArrays:
     if arrays.ewa is None or sensor.lens_radius is not None:
         return arrays
     slots = min(int(sensor.width) * int(sensor.height), MOST_SLOTS)
-    memory = Memory(np.full((slots, 2), -1, np.int64), np.zeros((slots, CHANNELS), np.float32))
+    memory = Memory(np.int64(sensor.width), np.full((slots, 2), -1, np.int64), np.zeros((slots, CHANNELS), np.float32))
     return arrays._replace(ewa=arrays.ewa._replace(memory=memory))

@@ -170,8 +170,9 @@ def row(method: str, scielab: float, **more: float) -> dict[str, Any]:
 
 
 def said(*rows: dict[str, Any]) -> str:
-    (sentence,) = reasons(pa.Table.from_pylist(list(rows)))
-    return sentence
+    (reason,) = reasons(pa.Table.from_pylist(list(rows)))
+    assert (reason.layout, reason.image) == ("rgb_stripe", "text")
+    return reason.text
 
 
 def test_nothing_is_said_where_the_optimal_filter_wins_or_ties() -> None:
@@ -182,40 +183,40 @@ def test_nothing_is_said_where_the_optimal_filter_wins_or_ties() -> None:
 
 def test_who_wins_and_by_how_much() -> None:
     sentence = said(row("optimal", 2.0), row("mitchell", 1.8), row("box", 1.5))
-    assert sentence.startswith("rgb_stripe, text: box per subpixel beats optimal, analytic by 25 % (S-CIELAB 1.5 against 2).")
+    assert sentence.startswith("Box per subpixel beats optimal, analytic by 25 % (S-CIELAB 1.50 against 2.00).")
     assert "clipping" not in sentence
 
 
 def test_clipping_is_the_cause_or_a_part_or_none() -> None:
     whole = said(row("optimal", 2.0, clipped=0.2, scielab_unclipped=1.0), row("box", 1.5))
-    assert "The cause is clipping (20 % of its subpixels, 0 % of the other's): on a display without limits it would win, 1 against 1.5." in whole
+    assert "The cause is clipping (20 % of its subpixels, 0 % of the other's): on a display without limits it would win, 1.00 against 1.50." in whole
     part = said(row("optimal", 2.0, clipped=0.2, scielab_unclipped=1.8), row("box", 1.5))
     assert "Of the loss 40 % comes from clipping" in part
-    assert "1.8 against 1.5" in part
+    assert "1.80 against 1.50" in part
     reverse = said(row("optimal", 2.0, clipped=0.01, scielab_unclipped=2.0), row("box", 1.5, clipped=0.3, scielab_unclipped=1.0))
-    assert "it would lose by more, 2 against 1" in reverse
+    assert "it would lose by more, 2.00 against 1.00" in reverse
     assert "clipping" not in said(row("optimal", 2.0, clipped=0.2, scielab_unclipped=1.99), row("box", 1.5))
 
 
 def test_what_the_analytic_filter_omits() -> None:
     assert "What it omits costs it that" in said(row("optimal", 2.0), row("kernels", 1.5), row("box", 1.7))
     assert "would win back 80 % of the loss" in said(row("optimal", 2.0), row("kernels", 1.6), row("box", 1.5))
-    assert "All solved kernels would lose by more (2.4)" in said(row("optimal", 2.0), row("kernels", 2.4), row("box", 1.5))
+    assert "All solved kernels would lose by more (2.40)" in said(row("optimal", 2.0), row("kernels", 2.4), row("box", 1.5))
 
 
 def test_measures_that_disagree() -> None:
     ahead = said(row("optimal", 2.0, weighted_error=0.03), row("box", 1.5, weighted_error=0.04))
-    assert "it is ahead, 0.03 against 0.04: the two measures disagree" in ahead
+    assert "it is ahead, 0.0300 against 0.0400: the two measures disagree" in ahead
     behind = said(row("optimal", 2.0, weighted_error=0.05), row("kernels", 2.1, weighted_error=0.01), row("box", 1.5, weighted_error=0.04))
-    assert "it is behind too, 0.05 against 0.04, but the kernels that it approximates are ahead, 0.01" in behind
+    assert "it is behind too, 0.0500 against 0.0400, but the kernels that it approximates are ahead, 0.0100" in behind
     assert "Eq. 4.4" not in said(row("optimal", 2.0), row("box", 1.5))
 
 
 def test_blur_and_fringes_are_told_apart() -> None:
     fringes = said(row("optimal", 2.0, lightness=1.0, chroma=1.7), row("box", 1.5, lightness=1.1, chroma=0.9))
-    assert "It loses in color (fringes: 1.7 against 0.9); it wins in lightness (blur, ringing: 1 against 1.1)." in fringes
+    assert "It loses in color (fringes: 1.70 against 0.900); it wins in lightness (blur, ringing: 1.00 against 1.10)." in fringes
     blur = said(row("optimal", 2.0, lightness=1.8, chroma=0.5), row("box", 1.5, lightness=1.2, chroma=0.5))
-    assert "It loses in lightness (blur, ringing: 1.8 against 1.2)." in blur
+    assert "It loses in lightness (blur, ringing: 1.80 against 1.20)." in blur
     assert "color" not in blur
     both = said(row("optimal", 2.0, lightness=1.2, chroma=1.6), row("box", 1.5, lightness=1.0, chroma=1.1))
     assert both.index("color (fringes") < both.index("lightness (blur")  # the greater part first

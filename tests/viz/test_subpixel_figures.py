@@ -16,6 +16,7 @@ from queries.subpixel.analysis import Analysis, Display
 from queries.subpixel.description import LayoutDescription, SubpixelDescription
 from queries.subpixel.preference import layouts_ranked, methods_ranked
 from renderer.filters.subpixel.derive import derive
+from renderer.filters.subpixel.sensitivity import exponential, gaussian
 from renderer.filters.subpixel.windowed_sinc import fit
 from viz.subpixel import figures, fit_rows
 from viz.subpixel.band_pass import Influence, influence
@@ -23,15 +24,15 @@ from viz.subpixel.band_pass import compared as compared_influence
 from viz.subpixel.comparison import compared_layouts, compared_methods, methods_figure, paired
 from viz.subpixel.cost import Cost, costs, spread
 from viz.subpixel.cost import compared as compared_costs
-from viz.subpixel.fits import compared_fits, display_rows
+from viz.subpixel.fits import WHY, compared_fits, display_rows
 from viz.subpixel.kernels import kernels_figure
-from viz.subpixel.look import PRIMARY_COLORS, shown_subpixels, subpixel_names
+from viz.subpixel.look import PRIMARY_COLORS, label_panels, new_panels, pixel_nyquist, shown_subpixels, subpixel_names
 from viz.subpixel.low_pass import compared as compared_widths
 from viz.subpixel.low_pass import width
 from viz.subpixel.mosaic import enlarged, mosaic, pixel_light, reduced
 from viz.subpixel.renderings import compared as compared_rendering
 from viz.subpixel.renderings import means, rendering_figure, strongest
-from viz.subpixel.spectra import clamped_spectrum, peaks, spectra_figure
+from viz.subpixel.spectra import PRINTED_DISTANCE, clamped_spectrum, peaks, spectra_figure
 from viz.subpixel.spectra import compared as compared_spectra
 from viz.subpixel.surfaces import surfaces_figure
 
@@ -60,7 +61,7 @@ def with_fits(name: str, **changes: Any) -> Display:
 def scores(values: dict[tuple[str, str], list[float]], seconds: float = 0.5) -> pa.Table:
     """Scores of (layout, method), image by image."""
     rows = [
-        {"layout": layout, "image": f"image {i}", "method": method, "scielab": value, "seconds": seconds}
+        {"layout": layout, "image": f"image {i}", "method": method, "scielab": value, "scielab_unclipped": value, "seconds": seconds}
         for (layout, method), found in values.items()
         for i, value in enumerate(found)
     ]
@@ -135,7 +136,15 @@ def test_kernels_are_drawn_in_their_channels_colors(tmp_path: pathlib.Path) -> N
     assert has_color(picture[:, :third], PRIMARY_COLORS["R"]) > 2 * has_color(picture[:, third : 2 * third], PRIMARY_COLORS["R"])
     assert found.agreement == "differs"
     assert "46.62" in found.comparison
-    assert "46 cm" in found.caption
+
+
+def test_what_is_told_of_the_table_holds() -> None:
+    layout, told = DESCRIPTION.displays()["rgb_stripe"], WHY["BGR"]
+    found = fit(derive(layout, DESCRIPTION.viewing, exponential(2.0)))
+    assert all(f"{letter} {one.b:.0f}" in told for letter, one in zip("RGB", found, strict=True))
+    for constants in ((2.3, 2.0, 2.3), (2.3, 1.5, 1.0), (4.0, 2.0, 1.5)):
+        found = fit(derive(layout, DESCRIPTION.viewing, exponential(constants)))
+        assert found[2].b > found[0].b
 
 
 def test_maps_of_two_dimensional_kernels_have_both_signs(tmp_path: pathlib.Path) -> None:
@@ -156,9 +165,23 @@ def test_cross_kernels_peak_at_the_pixel_nyquist_frequency(tmp_path: pathlib.Pat
     assert spectra_figure(one, DESCRIPTION, tmp_path).comparison.count(f"{max(peak.magnitude for peak in cross):.2f}") == 1
 
 
+def test_what_is_told_of_strong_peaks_holds() -> None:
+    """One sensitivity for all channels, whatever it is, gives one amplitude; a narrower one for color gives a larger; 25 cm give 8.6 cpd."""
+    layout = DESCRIPTION.displays()["rgb_stripe"]
+    curves = (exponential(2.3), exponential(1.6), gaussian(6.0), exponential((2.3, 2.0, 2.0)))
+    derived = [dataclasses.replace(display("rgb_stripe"), kernels=derive(layout, DESCRIPTION.viewing, curve)) for curve in curves]
+    default, other, bell, narrower = (max(peak.magnitude for peak in peaks(one) if not peak.own) for one in derived)
+    assert default == pytest.approx(other, abs=1e-6) == pytest.approx(bell, abs=1e-6)
+    assert narrower > 1.2 * default
+    assert layout.opponent[0, 1] == 0.73
+    assert f"{pixel_nyquist(DESCRIPTION.model_copy(update={'distance': 25.0})):.1f} cpd" in PRINTED_DISTANCE
+
+
 def test_agreement_of_spectra_follows_the_amplitude() -> None:
     one = display("rgb_stripe")
-    assert compared_spectra(one, DESCRIPTION, peaks(one))[0] == "differs"
+    agreement, words = compared_spectra(one, DESCRIPTION, peaks(one))
+    assert agreement == "differs"
+    assert "Differs in: amplitudes of at most 0.5." in words
     weak = [peak if peak.own else dataclasses.replace(peak, magnitude=0.3 * peak.magnitude) for peak in peaks(one)]
     assert compared_spectra(one, DESCRIPTION, weak)[0] == "agrees"
     moved = [peak if peak.own else dataclasses.replace(peak, frequency=20.0) for peak in weak]
@@ -202,6 +225,15 @@ def test_widths_are_those_of_the_fits() -> None:
     h = one.kernels.h.copy()
     h[0, 0] = h[1, 1]
     assert compared_widths(dataclasses.replace(one, kernels=dataclasses.replace(one.kernels, h=h)))[0] == "differs"
+
+
+def test_every_column_of_panels_has_a_named_axis_below() -> None:
+    figure, panels = new_panels(2, 2, 4.0, "three of four", sharex=True)
+    label_panels(panels, 3, "x", "y")
+    figure.canvas.draw()
+    assert [axes.get_xlabel() for axes in panels.ravel()] == ["", "x", "x", ""]
+    assert [any(tick.label1.get_visible() for tick in axes.xaxis.get_major_ticks()) for axes in panels.ravel()[:3]] == [False, True, True]
+    assert not panels[1, 1].axison
 
 
 def test_many_subpixels_are_shown_by_the_first_of_each_primary() -> None:
@@ -326,18 +358,20 @@ def test_agreement_of_methods_follows_the_scores() -> None:
     base = np.array([1.0, 1.3, 2.0, 2.5, 0.8, 1.1])
     noise = np.array([0.0, 0.02, -0.02, 0.03, 0.01, -0.01])
     points = {"optimal": base, "pixel_mitchell": base + 1 + noise, "box": base + 0.5 + noise, "mitchell": base + 0.6 - noise}
-    agreement, words = compared_methods(points, ranking(points))
+    agreement, words = compared_methods(points, ranking(points), points)
     assert agreement == "agrees"
+    assert "without limits" not in words
     assert "box per subpixel: −0.51 (p < 0.0001)" in words
     assert "ranks first" in words
 
     tied = points | {"box": base + 20 * noise - 0.2}
-    agreement, words = compared_methods(tied, ranking(tied))
+    agreement, words = compared_methods(tied, ranking(tied), points)
     assert agreement == "differs"
     assert "not told apart from box per subpixel" in words
     assert "ranks behind box per subpixel" in words
+    assert "nothing is clipped, it would be box per subpixel: −0.51 (p < 0.0001)." in words
     few = {name: values[:3] for name, values in points.items()}
-    assert compared_methods(few, ranking(few))[0] == "not comparable"
+    assert compared_methods(few, ranking(few), few)[0] == "not comparable"
 
 
 def test_agreement_of_displays_follows_the_scores() -> None:

@@ -135,7 +135,7 @@ def _cell(column: Column, row: Mapping[str, Any], ends: tuple[str, str] | None) 
     if value is None:
         return Cell(UNKNOWN, None)
     if column.name == "method":
-        return Cell(method_title(value), method_title(value), code=value if "rank" in row else "")
+        return Cell(method_title(value), method_title(value))
     if column.name in ("layout", "image"):
         title = layout_title(value) if column.name == "layout" else image_title(value)
         return Cell(title, title)

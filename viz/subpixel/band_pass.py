@@ -16,8 +16,7 @@ from queries.subpixel.targets import target
 from viz.numbers import number, percent
 from viz.report.subpixel import layout_title
 from viz.subpixel.figure import Agreement, Figure
-from viz.subpixel.fits import same_viewer
-from viz.subpixel.look import settings
+from viz.subpixel.fits import family, same_viewer
 from viz.subpixel.mosaic import as_picture, enlarged, mosaic, pixel_light
 
 F32 = npt.NDArray[np.float32]
@@ -26,6 +25,11 @@ PATTERN = "zone_plate"
 SIZE, ENLARGED = 108, 4  # pixels of the display, across and down; screen pixels for each
 TIMES = 32  # by how much the thesis scales the difference
 NOTICED = 1.0  # S-CIELAB difference that can just be seen
+_STATED = {
+    "RGB": "",
+    "RGBG": " Fig. 4.6: their contribution on RGBG is similarly low as on RGB displays.",
+    "RGBW": " Section 4.3.5 ignores them on 2-D RGBW again.",
+}
 STATED_SHARE = 0.95  # of the picture must stay below that for a difference to be insignificant
 
 
@@ -66,9 +70,9 @@ def band_pass_figure(display: Display, description: SubpixelDescription, folder:
         f"{number(found.mean)} of full drive.",
         caption="A zone plate with every frequency up to the pixel Nyquist frequency at the middle of its edges (gray on the left, red against "
         f"green at the upper right, blue against yellow at the lower right), on {SIZE} x {SIZE} pixels of {title}: the mean light of the subpixels "
-        f"around each pixel's center, sRGB. Right: the absolute difference of linear light, × {TIMES}. {settings(description)}.",
+        f"around each pixel's center, sRGB. Right: the absolute difference of linear light, × {TIMES}.",
         thesis="Section 4.5.1 and Fig. 4.8: left out, the band-pass kernels make a visually insignificant difference on a high-frequency pattern, "
-        f"which becomes visible only when it is scaled {TIMES}-fold.",
+        f"which becomes visible only when it is scaled {TIMES}-fold.{_STATED.get(family(display.layout), ' The display is not named.')}",
         agreement=agreement,
         comparison=comparison,
     )
@@ -108,6 +112,10 @@ def compared(found: Influence, description: SubpixelDescription) -> tuple[Agreem
         f"on average and {number(found.largest)} at most; {percent(found.above)} of them by more than 1/{TIMES}, so that scaled they are beyond "
         f"full drive: {'faint' if faint else 'larger than a difference that shows only when scaled'} (limit {percent(limit)})."
     )
+    if not insignificant:
+        text += " The spectra tell why: on this display kernels from other channels are neither narrow nor weak."
+    elif not faint:
+        text += " It lies near the pixel Nyquist frequency, where these kernels peak and where the viewer sees little."
     if not same_viewer(description):
         text += " The thesis's viewer is another one, so its bands lie at other frequencies."
     return ("agrees" if insignificant and faint else "differs"), text

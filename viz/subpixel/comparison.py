@@ -16,7 +16,7 @@ from viz.charts import COLORS, FAINT, INK, new_chart
 from viz.report.subpixel import layout_title, method_title
 from viz.subpixel.figure import Agreement, Figure
 from viz.subpixel.fits import family
-from viz.subpixel.look import QUIET, listed, plain_numbers, quiet, save_panels, settings
+from viz.subpixel.look import QUIET, listed, plain_numbers, quiet, save_panels
 
 F64 = npt.NDArray[np.float64]
 
@@ -56,7 +56,8 @@ def methods_figure(analysis: Analysis, layout: str, folder: pathlib.Path) -> Fig
     dot_plot(
         file, [(method_title(row["method"]), row, points[row["method"]], row["method"] in DERIVED) for row in rows], f"{title}: methods compared"
     )
-    agreement, comparison = compared_methods(points, rows)
+    unlimited = scores_of(analysis.scores, "method", "layout", layout, "scielab_unclipped")
+    agreement, comparison = compared_methods(points, rows, unlimited)
     images = len(next(iter(points.values())))
     return Figure(
         name=f"methods_{layout}",
@@ -65,7 +66,7 @@ def methods_figure(analysis: Analysis, layout: str, folder: pathlib.Path) -> Fig
         alt=f"A dot plot of {len(rows)} methods by mean S-CIELAB difference, from {method_title(rows[0]['method'])} ({rows[0]['scielab']:.2f}) to "
         f"{method_title(rows[-1]['method'])} ({rows[-1]['scielab']:.2f}).",
         caption=f"How far {title} is from the picture at full resolution by each method: S-CIELAB difference (about 1 can just be seen), mean over "
-        f"{_how_told(images, 'the optimal filter')} Blue: the derived filters; orange: others. {settings(analysis.description)}.",
+        f"{_how_told(images, 'the optimal filter')} Blue: the derived filters; orange: others.",
         thesis="Fig. 4.12 and section 4.5.4: 22 people preferred the optimal filter significantly (p < 0.01, t-test) to a box and a Mitchell "
         "filter for each subpixel and to a Mitchell filter for each pixel, on six images.",
         agreement=agreement,
@@ -92,8 +93,7 @@ def layouts_figure(analysis: Analysis, folder: pathlib.Path) -> Figure | None:
         alt=f"A dot plot of {len(rows)} displays by mean S-CIELAB difference, from {layout_title(rows[0]['layout'])} ({rows[0]['scielab']:.2f}) to "
         f"{layout_title(rows[-1]['layout'])} ({rows[-1]['scielab']:.2f}).",
         caption="How far each display is from the picture at full resolution by the optimal filter: S-CIELAB difference (about 1 can just be "
-        f"seen), mean over {_how_told(images, layout_title(reference))} Displays have equally many pixels, not subpixels. "
-        f"{settings(analysis.description)}.",
+        f"seen), mean over {_how_told(images, layout_title(reference))} Displays have equally many pixels, not subpixels.",
         thesis="Fig. 4.13 and section 4.5.4: RGB and RGBW were not significantly different; both were significantly better than RGBG (p < 0.01, "
         "t-test).",
         agreement=agreement,
@@ -101,12 +101,12 @@ def layouts_figure(analysis: Analysis, folder: pathlib.Path) -> Figure | None:
     )
 
 
-def scores_of(scores: pa.Table, of: str, fixed: str, value: str) -> dict[str, F64]:
-    """S-CIELAB of each image, in the images' alphabetical order, by method or layout (``of``), where the other (``fixed``) has a value."""
+def scores_of(scores: pa.Table, of: str, fixed: str, value: str, score: str = "scielab") -> dict[str, F64]:
+    """A score of each image, in the images' alphabetical order, by method or layout (``of``), where the other (``fixed``) has a value."""
     found: dict[str, dict[str, float]] = {}
-    for row in scores.select([of, fixed, "image", "scielab"]).to_pylist():
+    for row in scores.select([of, fixed, "image", score]).to_pylist():
         if row[fixed] == value:
-            found.setdefault(row[of], {})[row["image"]] = row["scielab"]
+            found.setdefault(row[of], {})[row["image"]] = row[score]
     return {name: np.array([by_image[image] for image in sorted(by_image)]) for name, by_image in found.items()}
 
 
@@ -120,15 +120,15 @@ def paired(first: F64, second: F64) -> PairedTest:
     return PairedTest(float(change.mean()), float(stats.ttest_1samp(change, 0.0).pvalue))
 
 
-def compared_methods(points: Mapping[str, F64], rows: Sequence[Mapping[str, Any]]) -> tuple[Agreement, str]:
-    """Whether the optimal filter is significantly better than those of the thesis's study, in words."""
+def compared_methods(points: Mapping[str, F64], rows: Sequence[Mapping[str, Any]], unlimited: Mapping[str, F64]) -> tuple[Agreement, str]:
+    """Whether the optimal filter is significantly better than those of the thesis's study, in words; ``unlimited``: scores without clipping."""
     there = [name for name in STUDIED if name in points]
     if OPTIMAL not in points or not there:
         return "not comparable", "The methods of the thesis's study were not all compared here."
     count = len(points[OPTIMAL])
     tests = {name: paired(points[OPTIMAL], points[name]) for name in there}
     better = [name for name in there if tests[name].better]
-    text = "S-CIELAB of the optimal filter minus that of " + "; ".join(f"{TITLES.get(name, name)}: {_test(tests[name])}" for name in there) + "."
+    text = f"S-CIELAB of the optimal filter minus that of {_listed_tests(tests)}."
     worse = [name for name in there if tests[name].worse]
     same = [name for name in there if name not in better and name not in worse]
     groups = (("significantly better than", better), ("not told apart from", same), ("significantly worse than", worse))
@@ -139,7 +139,10 @@ def compared_methods(points: Mapping[str, F64], rows: Sequence[Mapping[str, Any]
     text += f" By the mean it ranks behind {listed([TITLES.get(n, n) for n in first])}." if first else " By the mean it ranks first of all."
     if count < FEWEST_IMAGES:
         return "not comparable", f"{text} {_few(count)}"
-    return ("agrees" if len(better) == len(STUDIED) else "differs"), text
+    missed = {name: paired(unlimited[OPTIMAL], unlimited[name]) for name in there if name not in better}
+    if missed:
+        text += f" On a display without limits, where nothing is clipped, it would be {_listed_tests(missed)}."
+    return ("agrees" if len(better) == len(STUDIED) else "differs"), f"{text} A test over images, not people."
 
 
 def compared_layouts(points: Mapping[str, F64], families: Mapping[str, str]) -> tuple[Agreement, str]:
@@ -207,6 +210,10 @@ def _how_told(images: int, reference: str) -> str:
         f"{images} images, with its 95 % interval from resampling the images; small dots: single images. Right: both, and how it differs from "
         f"{reference} image by image, where the 95 % interval of that difference leaves out 0."
     )
+
+
+def _listed_tests(tests: Mapping[str, PairedTest]) -> str:
+    return "; ".join(f"{TITLES.get(name, name)}: {_test(test)}" for name, test in tests.items())
 
 
 def _few(count: int) -> str:

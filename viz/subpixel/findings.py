@@ -6,7 +6,7 @@ from typing import Any
 
 from queries.subpixel.analysis import Analysis
 from renderer.filters.subpixel.methods import TITLES
-from viz.report.subpixel import image_title, interval, layout_title
+from viz.report.subpixel import image_title, interval, layout_title, method_title
 from viz.subpixel.look import listed
 
 OPTIMAL = ("optimal", "kernels")  # the derived methods; the others are simpler
@@ -68,7 +68,7 @@ def _of_layout(analysis: Analysis, layout: str, lost: list[Loss]) -> str:
     ranked = analysis.methods[layout].to_pylist()
     first, images = ranked[0], ranked[0]["images"]
     score = _scored(first)
-    text = f"On {layout_title(layout)}, {_called(first['method'])} comes closest to the reference: mean S-CIELAB difference {score}"
+    text = f"{method_title(first['method'])} comes closest to the reference on {layout_title(layout)}: mean S-CIELAB difference {score}"
     text += f" over {images} images." if images > 1 else "."
     place = next((i for i, row in enumerate(ranked) if row["method"] == "optimal"), None)
     if place is None:

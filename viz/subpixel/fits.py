@@ -28,6 +28,14 @@ _TABLE: dict[tuple[str, tuple[float, ...], int], tuple[tuple[float, float], ...]
 }
 
 
+# What is known of differences from the table beyond one analysis, by the primaries of a period in alphabetical order
+WHY = {
+    "BGR": " An exponential of 2.0 cpd gives R 91, G 72 and B 98; no smooth sensitivity that was tried puts B's below R's, as the table has it.",
+    "BGRW": " No sensitivity that was tried gives the table's row: a sinc of the distance cannot vanish at all positions of a square grid, as exact "
+    "reproduction asks, so products of two sincs are fitted and applied instead.",
+}
+
+
 @dataclass(frozen=True)
 class FitRow:
     """One subpixel's analytic filter, ``sin(a x) / (a x) exp(-x² / b)`` with x in positions, and the thesis's, None where it has none.
@@ -131,9 +139,10 @@ def compared_fits(rows: list[FitRow], description: SubpixelDescription) -> tuple
     if not off:
         return ("agrees" if good else "differs"), f"{text} All agree ({limits})."
     which = "no subpixel" if len(off) == len(rows) else f"only {listed([row.subpixel for row in rows if row.subpixel not in off])}"
+    why = WHY.get("".join(sorted(row.primary for row in rows)), "")
     return "differs", (
-        f"{text} Agreement ({limits}) holds for {which}. The thesis's contrast sensitivity was never published as numbers; b depends on it, and is "
-        "refitted here to the kernels at hand."
+        f"{text} Agreement ({limits}) holds for {which}. b depends on the contrast sensitivity, of which the thesis draws the curves (Fig. 4.2) but "
+        f"gives no numbers; it is refitted here to the kernels at hand.{why}"
     )
 
 

@@ -17,13 +17,13 @@ from viz.subpixel.look import (
     PRIMARY_WORDS,
     choice,
     colored_lines,
+    label_panels,
     listed,
     new_panels,
     panel_grid,
     panel_title,
     room,
     save_panels,
-    settings,
     shown_subpixels,
     subpixel_names,
     subpixel_words,
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 ZEROS = 4  # of the widest sinc, on each side, that the axis shows
 _STATED = {
     "RGB": "Fig. 4.3 shows nine kernels of the RGB stripe. Section 4.3.3 models the three low-pass ones by a Gaussian-windowed sinc with a root mean "
-    "square error below 0.02 for each channel, with the parameters of Table 4.1.",
-    "RGBG": "Section 4.3.4: the kernels of RGBG are low-pass ones of Gaussian-windowed sincs, with the parameters of Table 4.1; Fig. 4.6 omits the "
-    "others.",
+    "square error below 0.02 for each color channel; Table 4.1 lists its parameters.",
+    "RGBG": "Table 4.1 lists Gaussian-windowed sincs for the low-pass kernels of RGBG, one of them for each of its four subpixels; Fig. 4.6 shows "
+    "these kernels alone.",
 }
 
 
@@ -52,12 +52,7 @@ def kernels_figure(display: Display, description: SubpixelDescription, folder: p
     figure, panels = new_panels(rows, columns, 3.5 if rows == 1 else 0.5 + 2.5 * rows, f"{title}: all kernels", sharex=True, sharey=True)
     for subpixel, axes in zip(shown, panels.ravel(), strict=False):
         _draw_panel(axes, display, subpixel, offsets[near], h[subpixel][:, near])
-    for axes in panels.ravel()[len(words) :]:
-        axes.set_axis_off()
-    for axes in panels[:, 0]:
-        axes.set_ylabel("weight", fontsize=9)
-    for axes in panels[-1]:
-        axes.set_xlabel(f"offset (positions; a pixel is {layout.cells[0]})", fontsize=9)
+    label_panels(panels, len(words), f"offset (positions; a pixel is {layout.cells[0]})", "weight")
     spread = float(h[..., near].max() - h[..., near].min())
     panels[0, 0].set_ylim(h[..., near].min() - 0.06 * spread, h[..., near].max() + 0.03 * spread)
     if columns == 3:
@@ -74,7 +69,7 @@ def kernels_figure(display: Display, description: SubpixelDescription, folder: p
         caption=f"What each subpixel of {title} takes from the red, green and blue of the image at each offset. Dots: the kernels as they were "
         "solved, colored by the channel that influences the subpixel. Line: the analytic filter sin(ax)/(ax)·exp(−x²/b), times the kernel's value "
         f"at 0, fitted to the subpixel's own kernel. A pixel is {layout.cells[0]} positions wide; {reach} of the {len(offsets)} positions are shown "
-        f"to each side.{choice(layout)} {settings(description)}.",
+        f"to each side.{choice(layout)}",
         thesis=_STATED.get(family(layout), ""),
         agreement=agreement,
         comparison=comparison,

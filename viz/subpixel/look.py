@@ -1,4 +1,4 @@
-"""How figures of subpixels look: colors of primaries, names of subpixels and displays, quiet panels, settings in words."""
+"""How figures of subpixels look: colors of primaries, names of subpixels and displays, quiet panels, the viewer in words."""
 
 import pathlib
 from typing import TYPE_CHECKING, Any
@@ -57,13 +57,12 @@ def choice(layout: Layout) -> str:
     return "" if len(shown) == len(layout.active) else f" Of the {len(layout.active)} subpixels of a period the first of each primary is shown."
 
 
-def settings(description: SubpixelDescription) -> str:
-    """Where the display is seen from, and by whom, in words."""
+def viewer(description: SubpixelDescription) -> str:
+    """Where the displays are seen from, and by whom, in words."""
     viewing = description.viewing
-    sensitivity = description.sensitivity.sensitivity()
     return (
-        f"Viewer: {viewing.dpi:g} DPI seen from {viewing.distance:g} cm (pixel Nyquist frequency {pixel_nyquist(description):.3g} cpd), "
-        f"contrast sensitivity: {sensitivity.name}"
+        f"{viewing.dpi:g} DPI seen from {viewing.distance:g} cm (pixel Nyquist frequency {pixel_nyquist(description):.3g} cycles per degree), "
+        f"contrast sensitivity {description.sensitivity.sensitivity().name}"
     )
 
 
@@ -94,6 +93,19 @@ def new_panels(rows: int, columns: int, height: float, title: str, **shared: Any
     for axes in panels.ravel():
         quiet(axes)
     return figure, np.asarray(panels)
+
+
+def label_panels(panels: npt.NDArray[Any], count: int, x: str, y: str) -> None:
+    """Names of the axes at the outer ones of ``count`` panels, each column's lowest and the first column; panels beyond vanish."""
+    columns = panels.shape[1]
+    for place, axes in enumerate(panels.ravel()):
+        if place >= count:
+            axes.set_axis_off()
+        elif place + columns >= count:
+            axes.set_xlabel(x, fontsize=9)
+            axes.tick_params(labelbottom=True)
+    for axes in panels[:, 0]:
+        axes.set_ylabel(y, fontsize=9)
 
 
 def quiet(axes: "Axes") -> None:

@@ -21,7 +21,6 @@ from viz.subpixel.look import (
     panel_title,
     pixel_nyquist,
     save_panels,
-    settings,
     shown_subpixels,
     subpixel_names,
     subpixel_words,
@@ -79,7 +78,7 @@ def low_pass_figure(display: Display, description: SubpixelDescription, folder: 
         alt=f"Two charts: the kernels from their own channels of {len(shown)} subpixels ({listed(words)}) over the offset, and their spectra.",
         caption=f"What each subpixel of {title} takes from its own channel of the image, kernels from other channels left out, and how strongly it "
         "follows waves of each frequency. Kernels that lie nearly on one another are told apart by their "
-        f"dashes.{choice(layout)} {settings(description)}.",
+        f"dashes.{choice(layout)}",
         thesis="Fig. 4.6: the kernels of red and blue adapt to their lower resolution and have a larger support than those of the two greens; the "
         "spectra of red and blue are very similar."
         if family(layout) == "RGBG"
@@ -93,7 +92,7 @@ def compared(display: Display) -> tuple[Agreement, str]:
     """How wide the kernels are, and how alike the spectra of red and blue."""
     primaries, names = letters(display.layout), subpixel_names(display.layout)
     wide = [width(display, i) for i in range(len(primaries))]
-    spectra = {letter: spectrum(display.kernels, primaries.index(letter))[1]["RGB".index(letter)] for letter in "RB"}
+    spectra = {letter: spectrum(display.kernels, primaries.index(letter))[1][display.layout.primaries.index(letter)] for letter in "RB"}
     difference = float(np.abs(spectra["R"] - spectra["B"]).max())
     text = (
         f"Widths at half height, in pixels: {', '.join(f'{name} {value:.3g}' for name, value in zip(names, wide, strict=True))}. "

@@ -13,16 +13,17 @@ from queries.subpixel.analysis import Analysis
 from viz.report.numbers import seconds
 from viz.report.pages import Copier, Shown, copy_static, environment, picture_size, slug
 from viz.report.picture import Picture
-from viz.report.subpixel import CONTENTS, interval, layout_title, layouts_table, method_title, ranking_tables, scores_table
+from viz.report.subpixel import CONTENTS, image_title, interval, layout_title, layouts_table, method_title, ranking_tables, scores_table
 from viz.subpixel import sections
 from viz.subpixel.figure import Figure
 from viz.subpixel.findings import result
+from viz.subpixel.look import viewer
 from viz.subpixel.mosaic import pixel_light
 from viz.subpixel.renderings import strongest
 
 _STATIC = ("report.css", "subpixel.css", "report.js", "subpixel.js")
 _PIXEL = 18  # pixels of the screen for each pixel of the display, where a picture is seen closely
-_ROWS = 28  # of all scores, before a reader asks for more
+_ROWS = 14  # of all scores, before a reader asks for more
 
 
 @dataclass(frozen=True)
@@ -85,17 +86,16 @@ def _contents(analysis: Analysis, figures: Sequence[Told], pictures: Sequence[Cl
         "result": result(analysis),
         "pictures": pictures,
         "middle": _middle(analysis),
-        "clipped": [(layout_title(one.layout.name), one.clipped) for one in analysis.displays],
-        "method": method_title(analysis.description.method),
         "rankings": ranking_tables(analysis.methods),
         "layouts": layouts_table(analysis.layouts) if analysis.layouts is not None else None,
         "matrices": sections.matrices(analysis.scores) if analysis.scores is not None else [],
         "scores": scores_table(analysis.scores, _ROWS) if analysis.scores is not None else None,
-        "reasons": analysis.reasons,
+        "reasons": [(f"{layout_title(one.layout)}, {image_title(one.image)}", one.text) for one in analysis.reasons],
         "fits": sections.fit_table(analysis),
         "conditions": sections.condition_table(analysis),
         "warnings": sections.warnings(analysis),
         "figures": figures,
+        "viewer": viewer(analysis.description),
         "agreements": [(word, sum(one.figure.agreement == word for one in figures)) for word in ("agrees", "differs", "not comparable")],
         "settings": sections.settings_rows(analysis),
         "patterns": sections.patterns(analysis),

@@ -32,7 +32,7 @@ _FRAME = ((0, 0, 0), (255, 221, 51))  # of the part that is enlarged, outside an
 _STATED = {
     "RGB": "Fig. 4.9: the difference to standard anti-aliasing is mostly purple for the RGB stripe, as green subpixels stand on the pixels' centers "
     "while red and blue ones are offset and thus most affected.",
-    "RGBG": "Fig. 4.9: for RGBG the green subpixels are shifted off the pixels' centers, so they are affected too.",
+    "RGBG": "Fig. 4.9: for RGBG the green subpixels are shifted. We read: off the pixels' centers, so that they are affected too.",
     "RGBW": "Fig. 4.9: all subpixels are roughly equally affected with the 2-D RGBW layout.",
 }
 

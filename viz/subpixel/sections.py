@@ -88,7 +88,7 @@ def fit_table(analysis: Analysis) -> Table:
             "what x of the filter is, in positions of the display’s pattern: the offset, the distance, or both offsets in a product",
             "words",
         ),
-        Column("a", "a", "where the filter’s zeros are; in parentheses, of π; of products, across and then down", "number"),
+        Column("a", "a", "where the filter’s zeros are: π / a apart; of products, across and then down", "number"),
         Column("b", "b", "how wide its window is, squared positions", "number"),
         Column("rms", "rms", "root mean square of the kernel’s difference from the filter; the thesis states less than 0.02", "number"),
         Column("relative", "relative", "the same in units of the kernel’s own root mean square", "number"),
@@ -101,19 +101,14 @@ def fit_table(analysis: Analysis) -> Table:
 
 def _fit_row(row: FitRow) -> list[Cell]:
     title, model = layout_title(row.layout), _MODELS[row.model] + ("" if row.applied else " (not applied)")
-    a, b = _of_pi(row.a), _width(row.b)
+    a, b = number(row.a), _width(row.b)
     if row.a_down is not None and row.b_down is not None:
-        a, b = f"{a}, {_of_pi(row.a_down)}", f"{b}, {_width(row.b_down)}"
+        a, b = f"{a}, {number(row.a_down)}", f"{b}, {_width(row.b_down)}"
     return [
         *(Cell(title, title), Cell(row.subpixel, row.subpixel), Cell(model, model), Cell(a, row.a), Cell(b, row.b)),
         *(Cell(number(row.rms, 2), row.rms), Cell(percent(row.relative, 2), row.relative)),
-        *(Cell(_of_pi(row.thesis_a), row.thesis_a), Cell(number(row.thesis_b), row.thesis_b), Cell(row.agreement, row.agreement)),
+        *(Cell(number(row.thesis_a), row.thesis_a), Cell(number(row.thesis_b), row.thesis_b), Cell(row.agreement, row.agreement)),
     ]
-
-
-def _of_pi(value: float | None) -> str:
-    """A parameter a, and how many times it goes into π."""
-    return UNKNOWN if value is None else f"{number(value, 3)} (π/{number(math.pi / value, 3)})"
 
 
 def _width(value: float) -> str:
@@ -154,7 +149,12 @@ def _condition_row(display: Display) -> list[Cell]:
 
 def warnings(analysis: Analysis) -> list[str]:
     """What should not be trusted: systems that are singular, kernels that displays clip, fits that miss."""
-    return [text for one in analysis.displays for text in (*one.kernels.warnings(), *(fit.warning for fit in one.fits)) if text]
+    return [
+        layout_title(one.layout.name) + text.removeprefix(one.layout.name)
+        for one in analysis.displays
+        for text in (*one.kernels.warnings(), *(fit.warning for fit in one.fits))
+        if text
+    ]
 
 
 # --- settings ------------------------------------------------------------------------------------------------------

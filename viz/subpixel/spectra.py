@@ -20,6 +20,7 @@ from viz.subpixel.look import (
     PRIMARY_WORDS,
     choice,
     colored_lines,
+    label_panels,
     listed,
     new_panels,
     note,
@@ -28,7 +29,6 @@ from viz.subpixel.look import (
     pixel_nyquist,
     room,
     save_panels,
-    settings,
     shown_subpixels,
     subpixel_names,
     subpixel_words,
@@ -43,9 +43,21 @@ SHOWN = 3.0  # pixel Nyquist frequencies that the axis shows
 CLOSE_PEAK = 0.10  # relative deviation of a peak's frequency from what the thesis states
 LOW_PASS = 0.01  # by how much a low-pass kernel may deviate from 1 at frequency 0
 BAND_PASS = 0.05  # the share of its peak that a band-pass kernel may have at frequency 0
+NARROW = 0.5  # of the pixel Nyquist frequency: how wide a "narrow frequency band" may be where a spectrum is at least half as high as at its peak
 LOW_AMPLITUDE = 0.5  # of a low-pass kernel at frequency 0: what the thesis, which gives no number, calls a "low amplitude" is surely not above this
 NEGLIGIBLE = 0.005  # peaks below are not looked at
 _SAMPLES = 513  # of a filter, across
+
+# What is known of differences from the thesis beyond one analysis
+STRONG_PEAKS = (
+    "With one sensitivity for all three channels these amplitudes follow from the opponent matrix (Eq. 4.2) alone, whatever that sensitivity is: "
+    "green has 73% of the luminance, and red subpixels counter what green ones alias. A narrower sensitivity to color raises them."
+)
+PRINTED_DISTANCE = "Section 4.3.2 prints a distance of 25 cm for these 16 cpd, which would put the pixel Nyquist frequency at 8.6 cpd; 46 cm fits."
+_WHY = {
+    "RGBG": " Red and blue subpixels stand two pixels apart; the greens counter what they alias, so that their bands are wide.",
+    "RGBW": " White looks like red, green and blue together, so the solution trades them: kernels need not pass 1 and 0 of a constant.",
+}
 
 
 @dataclass(frozen=True)
@@ -73,12 +85,7 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
     found = peaks(display)
     for subpixel, axes in zip(shown, panels.ravel(), strict=False):
         _draw_panel(axes, display, description, subpixel, [peak for peak in found if peak.subpixel == subpixel_names(layout)[subpixel]])
-    for axes in panels.ravel()[len(words) :]:
-        axes.set_axis_off()
-    for axes in panels[:, 0]:
-        axes.set_ylabel("magnitude", fontsize=9)
-    for axes in panels[-1]:
-        axes.set_xlabel("frequency (cycles per degree)", fontsize=9)
+    label_panels(panels, len(words), "frequency (cycles per degree)", "magnitude")
     panels[0, 0].set_xlim(0.0, min(SHOWN * nyquist, float(spectrum(display.kernels, 0)[0][-1])))
     analytic = [clamped_spectrum(display, description, i, np.linspace(0.0, nyquist, 101)).max() for i in shown]
     panels[0, 0].set_ylim(0.0, 1.06 * max(1.0, *(peak.magnitude for peak in found), *analytic))
@@ -97,7 +104,7 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
         "channel, and the curves of the other channels, each with a dot at its peak.",
         caption=f"How strongly each subpixel of {title} follows a wave of each frequency in the red, green and blue of the image; solid: the solved "
         f"kernels, with a dot at the peak of those from other channels; dashed: the analytic filter, ended at zero number {description.zeros} of "
-        f"its sinc and normalized.{cut}{choice(layout)} Gray line: the pixel Nyquist frequency. {settings(description)}.",
+        f"its sinc and normalized.{cut}{choice(layout)} Gray line: the pixel Nyquist frequency.",
         thesis="Fig. 4.4 and section 4.3.3, for the RGB stripe: each subpixel has a low-pass kernel, from its own channel, and two band-pass ones "
         "that peak at about 16 cycles per degree, in a narrow band and with a low amplitude, so that they hardly contribute and may be left out."
         if family(layout) == "RGB"
@@ -162,20 +169,23 @@ def compared(display: Display, description: SubpixelDescription, found: list[Pea
         f"{PRIMARY_WORDS[lowest.primary]} on {lowest.subpixel}."
     )
     if family(display.layout) != "RGB":
-        return "not comparable", text
+        return "not comparable", text + _WHY.get(family(display.layout), "")
     if not same_viewer(description):
         return "not comparable", f"{text} The thesis's viewer has a pixel Nyquist frequency of about {STATED_PEAK:g} cpd."
     near = all(abs(f / STATED_PEAK - 1) <= CLOSE_PEAK for f in frequencies)
+    narrow = max(_band(display, peak) for peak in cross) <= NARROW * pixel_nyquist(description)
     weak = highest.magnitude <= LOW_AMPLITUDE
     parts = {
         f"low-pass kernels pass 1 within {LOW_PASS:.0%}": low,
         f"others pass at 0 no more than {BAND_PASS:.0%} of their peaks": band,
         f"peaks within {CLOSE_PEAK:.0%} of {STATED_PEAK:g} cpd": near,
+        f"half as high over at most {NARROW:.0%} of the pixel Nyquist frequency": narrow,
         f"amplitudes of at most {LOW_AMPLITUDE:g}": weak,
     }
     kept, missed = ([part for part, holds in parts.items() if holds is wanted] for wanted in (True, False))
     text += (f" Agrees in: {'; '.join(kept)}." if kept else "") + (f" Differs in: {'; '.join(missed)}." if missed else "")
-    return ("differs" if missed else "agrees"), text.replace("%", " %")
+    text += f" {STRONG_PEAKS}" if not weak else ""
+    return ("differs" if missed else "agrees"), f"{text} {PRINTED_DISTANCE}".replace("%", " %")
 
 
 def _range(values: list[float], form: str) -> str:
@@ -187,8 +197,8 @@ def _range(values: list[float], form: str) -> str:
 def _band(display: Display, peak: Peak) -> float:
     """Over how wide a band, cycles per degree, a spectrum is at least half as high as at its peak."""
     frequency, magnitude = spectrum(display.kernels, subpixel_names(display.layout).index(peak.subpixel))
-    high = np.count_nonzero(magnitude[display.layout.primaries.index(peak.primary)] >= 0.5 * peak.magnitude)
-    return float(high * (frequency[1] - frequency[0]))
+    along = magnitude[display.layout.primaries.index(peak.primary)]
+    return float(np.count_nonzero(along >= 0.5 * along.max()) * (frequency[1] - frequency[0]))
 
 
 def _draw_panel(axes: "Axes", display: Display, description: SubpixelDescription, subpixel: int, found: list[Peak]) -> None:

@@ -15,13 +15,13 @@ from viz.subpixel.fits import compared_fits, display_rows, family
 from viz.subpixel.look import (
     PRIMARY_COLORS,
     choice,
+    label_panels,
     letters,
     listed,
     new_panels,
     panel_grid,
     panel_title,
     save_panels,
-    settings,
     shown_subpixels,
     subpixel_names,
     subpixel_words,
@@ -52,12 +52,8 @@ def surfaces_figure(display: Display, description: SubpixelDescription, folder: 
     image = None
     for i, axes in zip(shown, panels.ravel(), strict=False):
         image = _draw_map(axes, display, i, own[i], kernels.rows_at[rows_at], kernels.columns_at[columns_at], largest)
-    for axes in panels.ravel()[len(words) :]:
-        axes.set_axis_off()
-    for axes in panels[:, 0]:
-        axes.set_ylabel("offset down (positions)", fontsize=9)
-    for axes in panels[-1]:
-        axes.set_xlabel(f"offset across (positions; a pixel is {layout.cells[0]} × {layout.cells[1]})", fontsize=9)
+    across = f"offset across (positions; a pixel is {layout.cells[0]} × {layout.cells[1]})"
+    label_panels(panels, len(words), across, "offset down (positions)")
     _color_bar(figure, image, panels, largest)
     file = save_panels(figure, folder / f"surfaces_{layout.name}.png")
 
@@ -75,7 +71,7 @@ def surfaces_figure(display: Display, description: SubpixelDescription, folder: 
         caption=f"What each subpixel of {title} takes from its own channel of the image around it. Colors: the solved kernel, on a scale that is "
         f"linear up to {LINEAR * largest:.2g} and logarithmic beyond. Lines: the fitted Gaussian-windowed sinc, here a "
         f"{shape.get(applied[0].model, 'function')}, at {levels} of the largest value, dashed where negative. Root mean square errors of the fits: "
-        f"{quality}.{choice(layout)} {settings(description)}.",
+        f"{quality}.{choice(layout)}",
         thesis="Fig. 4.7 and section 4.3.5: the low-pass kernels of 2-D RGBW have the overall shape of those in Fig. 4.3, and are approximated by "
         "a radial Gaussian-windowed sinc (Eq. 4.13) with the parameters of Table 4.1."
         if family(layout) == "RGBW"

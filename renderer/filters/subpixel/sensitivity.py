@@ -59,11 +59,14 @@ def box(cutoffs: float | Sequence[float]) -> Sensitivity:
 def table(frequency: Sequence[float], weights: Sequence[Sequence[float]]) -> Sensitivity:
     """Linear between tabulated values, constant beyond both ends.
 
-    Frequencies ascend, in cycles per degree; ``weights`` has as many values for each of Y', C1, C2.
+    Frequencies ascend, in cycles per degree; ``weights`` has as many values for each of Y', C1, C2. Raises ValueError where they do not.
     """
-    f, w = np.asarray(frequency, np.float64), np.asarray(weights, np.float64)
-    if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or (np.diff(f) <= 0).any() or w.shape != (3, len(f)):
+    f = np.asarray(frequency, np.float64)
+    if f.ndim != 1 or not len(f) or not np.isfinite(f).all() or (np.diff(f) <= 0).any() or [len(row) for row in weights] != [len(f)] * 3:
         raise ValueError("expected ascending frequencies, and for each of three channels as many weights")
+    w = np.asarray(weights, np.float64)
+    if not np.isfinite(w).all() or (w < 0).any() or not w.any():
+        raise ValueError("expected finite weights that are not negative, and some that are positive")
     return Sensitivity(f"table of {len(f)} frequencies", tuple(_table(f, row) for row in w))  # type: ignore[arg-type]
 
 
