@@ -5,16 +5,23 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 WORKERS ?= auto
 
-.PHONY: demo test test-slow lint docs clean
+# Programs that tests start would compile every module of the project again.
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: demo test test-quick test-slow lint docs clean
 
 demo: $(INSTALLED)
 	$(BIN)/pathspace run configs/cornell.yaml --out runs/cornell --resume
 
-test: lint
+# Side by side: mypy is one process, and pytest ends with one worker.
+test: $(INSTALLED)
+	$(MAKE) --keep-going --jobs 2 lint test-quick
+
+test-quick: $(INSTALLED)
 	$(BIN)/pytest -n $(WORKERS) -m "not slow"
 
 test-slow: $(INSTALLED)
-	$(BIN)/pytest -n $(WORKERS)
+	PATHSPACE_ALL_EXAMPLES=1 $(BIN)/pytest -n $(WORKERS)
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check

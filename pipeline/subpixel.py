@@ -90,9 +90,9 @@ def _write_display(analysis: "Analysis", display: "Display", work: pathlib.Path)
     """The drive of a display as numbers and as a picture; what it shows by the asked method, and then by a box for each pixel, the standard."""
     from queries.subpixel.display import drive_picture, subpixel_picture
     from renderer.filters.subpixel.methods import TITLES
-    from viz.numbers import percent
     from viz.pictures import write_png
     from viz.report import Picture
+    from viz.report.numbers import percent
     from viz.report.subpixel import layout_title
 
     layout, method, pictures = display.layout, analysis.description.method, work / "pictures"

@@ -13,7 +13,7 @@ from renderer.accelerators import Accelerators
 from renderer.bsdfs.base import Families
 from renderer.emitters.base import Environment
 from renderer.film import Film
-from renderer.scene.arrays import Scene
+from renderer.scene.arrays import Scene, SceneArrays
 from renderer.settings import UNBOUNDED_DEPTH, TraceSettings
 from renderer.shapes.base import Quadrics
 from renderer.textures.base import Textures
@@ -77,12 +77,16 @@ def columns(table: pa.Table) -> dict[str, np.ndarray]:
 
 
 def with_all_features(scene: Scene) -> Scene:
-    """The same scene with every optional piece present, so that kernels are compiled for all features.
+    """The same scene with every optional piece present but a lens, whose points are rows of the tables.
 
     Tests share this one specialization: compiling one for each small scene would take longer than all tests.
     """
-    arrays = scene.arrays
-    geometry, emitters, sensor = arrays.geometry, arrays.emitters, arrays.sensor
+    return dataclasses.replace(scene, arrays=all_features(scene.arrays))
+
+
+def all_features(arrays: SceneArrays) -> SceneArrays:
+    """The same arrays with every optional piece present but a lens."""
+    geometry, emitters = arrays.geometry, arrays.emitters
     nt = len(geometry.p0)
     quadrics = Quadrics(np.zeros(0, np.int32), np.zeros((0, 3, 4)), np.zeros((0, 3, 4)), np.zeros(0, np.uint8))
     no_images = Textures(
@@ -100,7 +104,7 @@ def with_all_features(scene: Scene) -> Scene:
         return otherwise if piece is None else piece
 
     corners = np.tile(np.array([[0, 0], [1, 0], [0, 1]], np.float32), (nt, 1, 1))
-    full = arrays._replace(
+    return arrays._replace(
         geometry=geometry._replace(
             normals=given(geometry.normals, np.repeat(geometry.ng[:, None, :], 3, axis=1)),
             uvs=given(geometry.uvs, corners),
@@ -116,6 +120,4 @@ def with_all_features(scene: Scene) -> Scene:
             sky=True,
             environment=given(emitters.environment, no_environment),
         ),
-        sensor=sensor._replace(lens_radius=given(sensor.lens_radius, np.float32(0)), focus=given(sensor.focus, np.float32(1))),
     )
-    return dataclasses.replace(scene, arrays=full)

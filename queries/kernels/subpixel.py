@@ -20,67 +20,22 @@ F64 = npt.NDArray[np.float64]
 I64 = npt.NDArray[np.int64]
 Walks = npt.NDArray[np.unsignedinteger]
 Chosen = npt.NDArray[np.bool_]
-Lanes = tuple[int, ...]  # as many as subpixels are reached: kernels are compiled for that number
-UNSIGNED = np.uint64
-
-
-@kernel
-def add_to_row(
-    x: np.float64, r: np.float64, g: np.float64, b: np.float64, begin: int, pixels: np.uint32, phases: int, across: F64, first: I64, shows: F64,
-    turns: int, values: F64, totals: F64, lanes: Lanes,
-) -> None:  # fmt: skip
-    """Add one sample to the subpixels of a row of pixels, whose first period's sums begin at ``begin``."""
-    reach = UNSIGNED(len(lanes))
-    pixel = np.int64(x)
-    turn = np.int64(np.uint32(pixel) // pixels)
-    column = UNSIGNED(pixel - turn * pixels)
-
-    # Where the tables have this phase, and where the sums begin
-    at = (x - pixel) * phases
-    phase = np.int64(at)
-    share = at - phase
-    start = (column * UNSIGNED(phases) + UNSIGNED(phase)) * UNSIGNED(2) * reach
-    change = start + reach
-    red = column * UNSIGNED(3) * reach
-    green, blue = red + reach, red + UNSIGNED(2) * reach
-    to = UNSIGNED(begin + turn * turns + first[column])
-
-    # All in one loop of known length, which becomes a few vector instructions
-    for k in range(len(lanes)):
-        w = across[start + UNSIGNED(k)] + share * across[change + UNSIGNED(k)]
-        values[to + UNSIGNED(k)] += w * (r * shows[red + UNSIGNED(k)] + g * shows[green + UNSIGNED(k)] + b * shows[blue + UNSIGNED(k)])
-        totals[to + UNSIGNED(k)] += w
-
-
-@kernel
-def splat_rows(
-    x: F32, y: F32, rgb: F32, width: int, height: int, first_row: int, pad: int, period: I64, phases: int, across: F64, first: I64, shows: F64,
-    lanes: Lanes, rows: int, columns: int, values: F64, totals: F64,
-) -> None:  # fmt: skip
-    """Add samples to the subpixels of their own row of pixels, one channel each.
-
-    All arrays are flat, ``values`` and ``totals`` of ``rows`` rows of ``columns``: with indices that cannot be negative, this is half as fast again.
-    ``period``: subpixels of one period.
-    """
-    pixels, turns = np.uint32(len(first)), period[0]
-    for i in range(len(x)):
-        if x[i] >= 0 and x[i] < width and y[i] >= 0 and y[i] < height:
-            row = np.int64(y[i]) - first_row
-            if row >= 0 and row < rows:
-                r, g, b = np.float64(rgb[i, 0]), np.float64(rgb[i, 1]), np.float64(rgb[i, 2])
-                begin = row * columns + pad
-                add_to_row(np.float64(x[i]), r, g, b, begin, pixels, phases, across, first, shows, turns, values, totals, lanes)
+Floats = npt.NDArray[np.floating]
 
 
 @kernel
 def splat_walks(
-    walk: Walks, chosen: Chosen, x: F32, y: F32, red: F32, green: F32, blue: F32, width: int, height: int, first_row: int, pad: int, period: I64,
-    phases: int, across: F64, first: I64, shows: F64, lanes: Lanes, rows: int, columns: int, values: F64, totals: F64,
+    walk: Walks, chosen: Chosen, x: Floats, y: Floats, red: F32, green: F32, blue: F32, width: int, height: int, first_row: int, pad: int,
+    period: I64, across: Floats, first: I64, shows: Floats, sums: Floats,
 ) -> None:  # fmt: skip
-    """The same for rows of ``paths``: a walk's rows lie together and are one sample, of which the chosen rows are the color."""
-    pixels, turns = np.uint32(len(first)), period[0]
-    i, n = 0, len(walk)
+    """Add walks to the subpixels of their own row of pixels, one channel each: rows of a walk lie together, and its chosen rows are the color.
+
+    Tables and sums are all float32 or all float64; tables have no patterns' rows. ``period``: subpixels of one period.
+    """
+    real = sums.dtype.type
+    i, n, pixels, turns, reach = 0, len(walk), len(first), period[0], across.shape[3]
     while i < n:
+        # The color of a walk
         place, this, r, g, b = i, walk[i], np.float64(0.0), np.float64(0.0), np.float64(0.0)
         while i < n and walk[i] == this:
             if chosen[i]:
@@ -88,10 +43,31 @@ def splat_walks(
                 g += np.float64(green[i])
                 b += np.float64(blue[i])
             i += 1
+        if not (x[place] >= 0 and x[place] < width and y[place] >= 0 and y[place] < height):
+            continue
         row = np.int64(y[place]) - first_row
-        if row >= 0 and row < rows:
-            begin = row * columns + pad
-            add_to_row(np.float64(x[place]), r, g, b, begin, pixels, phases, across, first, shows, turns, values, totals, lanes)
+        if row < 0 or row >= sums.shape[1]:
+            continue
+
+        # Where it lies, and what it reaches from there
+        pixel = np.int64(x[place])
+        turn, column = pixel, np.int64(0)
+        if pixels > 1:
+            turn = np.int64(np.uint32(pixel) // np.uint32(pixels))
+            column = pixel - turn * pixels
+        at = (np.float64(x[place]) - pixel) * across.shape[1]
+        phase = np.int64(at)
+        share, light_r, light_g, light_b = real(at - phase), real(r), real(g), real(b)
+        begin = pad + turn * turns + first[column]
+
+        # All subpixels in reach, in one loop along contiguous values
+        start, change = across[column, phase, 0], across[column, phase, 1]
+        of_red, of_green, of_blue = shows[column, 0], shows[column, 1], shows[column, 2]
+        values, weights = sums[0, row, begin : begin + reach], sums[1, row, begin : begin + reach]
+        for k in range(reach):
+            w = start[k] + share * change[k]
+            values[k] += w * (light_r * of_red[k] + light_g * of_green[k] + light_b * of_blue[k])
+            weights[k] += w
 
 
 @kernel

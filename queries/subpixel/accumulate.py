@@ -12,6 +12,7 @@ from renderer.filters.subpixel.filter import SubpixelFilter
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating]
 Bools = npt.NDArray[np.bool_]
 
 LEAST_SHARE = 0.1  # of the sum of the weights' magnitudes that their sum must reach: below, a few samples lie mostly on negative lobes
@@ -43,7 +44,7 @@ def accumulate_samples(x: npt.NDArray[np.floating], y: npt.NDArray[np.floating],
     return lattice
 
 
-def suspects(tables: WeightTables, weights: F64, samples: float) -> Bools:
+def suspects(tables: WeightTables, weights: Floats, samples: float) -> Bools:
     """Where sums of weights, (rows, columns), may be too small: with up to ``samples`` samples in a pixel, others are large enough."""
     weak, most = np.zeros(weights.shape, np.bool_), tables.most()
     for row, largest in enumerate(most):
@@ -52,17 +53,20 @@ def suspects(tables: WeightTables, weights: F64, samples: float) -> Bools:
     return weak
 
 
-def lattice_of(tables: WeightTables, sums: F64, weak: Bools) -> tuple[F32, Bools]:
+def lattice_of(tables: WeightTables, sums: Floats, weak: Bools) -> tuple[F32, Bools]:
     """Weighted means, float32 (rows, columns), and where subpixels have none. ``weak``: sums of which the weights say nothing, (rows, columns)."""
-    weights = np.where(weak | (sums[-1] == 0), 1.0, sums[-1])  # beside the display, there are none
-    lattice = of_primaries(tables, [tables.to_lattice(channel / weights) for channel in sums[:-1]])
-    return lattice, tables.to_lattice(weak.astype(np.float64)) > 0
+    weights, known = sums[-1], sums[-1] != 0  # beside the display, there are none
+    if weak.any():
+        known &= ~weak
+    zeros = (np.zeros(weights.shape, np.float32) for _ in sums[:-1])
+    means = [np.divide(channel, weights, out=out, where=known, casting="same_kind") for channel, out in zip(sums, zeros)]
+    return of_primaries(tables, [tables.to_lattice(mean) for mean in means]), tables.to_lattice(weak)
 
 
-def of_primaries(tables: WeightTables, channels: list[F64]) -> F32:
+def of_primaries(tables: WeightTables, channels: list[F32]) -> F32:
     """What each position's primary shows of its color: of one channel that itself, of three what the layout makes of them."""
     if len(channels) == 1:
-        return channels[0].astype(np.float32)
+        return channels[0]
     signal = tables.layout.signal(np.stack(channels, axis=-1))
     lattice = np.take_along_axis(signal, np.maximum(primaries(tables), 0)[..., None], axis=-1)[..., 0]
     return np.where(active_positions(tables), lattice, 0.0).astype(np.float32)

@@ -60,13 +60,6 @@ def clipped_share(lattice: Floating, layout: Layout) -> float:
     return outside / max(total, 1)
 
 
-def overshoot(lattice: Floating, layout: Layout) -> tuple[float, float]:
-    """By how much the drives of subpixels are below 0, and above 1, at most: both 0 or more."""
-    drives = [_of(lattice, layout, row, column) for row, column in layout.active]
-    below = max(float(-drive.min(initial=0.0)) for drive in drives)
-    return below, max(float(drive.max(initial=1.0)) for drive in drives) - 1.0
-
-
 def subpixel_picture(lattice: Floating, layout: Layout) -> U8:
     """The display under a magnifying glass, sRGB uint8, on ``fine_grid`` samples for each pixel: subpixels in their color at their drive.
 

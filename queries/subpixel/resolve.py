@@ -28,7 +28,9 @@ __all__ = ["Resolved", "accumulate_samples", "grid", "resolve"]
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.floating]
 Window = tuple[int, int, int, int]
+MOST_IN_FLOAT32 = 16.0  # samples of a pixel that a shard adds up in float32, to within about 1e-6 of the sum of their magnitudes
 _MARGIN = 1  # pixels around a window, for cells that take the mean of their neighbors
 
 
@@ -58,7 +60,7 @@ def resolve(
         return Resolved(lattice, int(np.count_nonzero(unknown)))
 
 
-def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDArray[np.bool_] | None = None) -> F64:
+def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDArray[np.bool_] | None = None) -> Floats:
     """Sums of all samples. ``wanted``: rows of positions, bool; of others, some samples may be left out."""
     sums = tables.allocate(tables.rows)
     work = functools.partial(_sum_shard, source, tables, wanted)
@@ -67,7 +69,7 @@ def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDA
     return sums
 
 
-def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.bool_] | None, found: Iterator[Piece]) -> tuple[int, F64]:
+def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.bool_] | None, found: Iterator[Piece]) -> tuple[int, Floats]:
     """What one shard adds: its first row of positions, and sums from there on."""
     there = list(found)
     first, last = 0, tables.rows
@@ -77,10 +79,13 @@ def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.
             kept = [i for i, band in enumerate(bands) if wanted[slice(*band)].any()]
             there, bands = [there[i] for i in kept], [bands[i] for i in kept]
         first, last = min((low for low, _ in bands), default=0), max((high for _, high in bands), default=0)
-    sums, beside = tables.allocate(last - first), None
+    few = source.most <= MOST_IN_FLOAT32 and tables.splat_walks is not None
+    sums, beside = tables.allocate(last - first, np.float32 if few else np.float64), None
     while there:
         piece = there.pop(0)
-        for samples in source.of(piece):
+        if tables.splat_walks and source.camera:
+            tables.splat_walks(source.walks(piece), first, sums)
+        for samples in source.others(piece) if tables.splat_walks else source.of(piece):
             if samples.counted or not source.camera:
                 tables.splat(samples.x, samples.y, samples.color, first, sums)
             else:

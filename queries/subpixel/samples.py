@@ -27,6 +27,25 @@ class Samples(NamedTuple):
     counted: bool
 
 
+class Walks(NamedTuple):
+    """Rows of ``paths``, of which those of a walk lie together and are one sample: the walk, whether its color counts, place and color."""
+
+    walk: npt.NDArray[np.unsignedinteger]
+    chosen: npt.NDArray[np.bool_]
+    x: F32
+    y: F32
+    red: F32
+    green: F32
+    blue: F32
+
+    def gathered(self) -> Samples:
+        """One sample for each walk."""
+        n = len(self.walk)
+        x, y, color = np.empty(n, np.float32), np.empty(n, np.float32), np.empty((n, 3), np.float32)
+        count = gather_samples(*self, x, y, color) if n else 0
+        return Samples(x[:count], y[:count], color[:count], True)
+
+
 @dataclass(frozen=True)
 class SampledRun:
     """The samples of a run: of camera walks, each one sample, lit or not; of light walks, each path one, that adds color alone."""
@@ -46,6 +65,12 @@ class SampledRun:
         return float(self.run.settings["passes"] * self.run.settings["keep"])
 
     @property
+    def most(self) -> float:
+        """How many samples of a pixel a shard has, about."""
+        settings = self.run.settings
+        return float(self.run.manifest["shards"]["walks"] / (settings["width"] * settings["height"]))
+
+    @property
     def banded(self) -> bool:
         """Whether a shard reaches but a band of the film."""
         settings = self.run.settings
@@ -58,30 +83,35 @@ class SampledRun:
 
     def of(self, piece: Piece) -> Iterator[Samples]:
         """The samples of a piece, in the order of its rows."""
-        terms = {term.table: term for term in self.layer.terms}
         if self.camera:
-            yield self._walks(piece, "paths", terms.pop("paths", None), counted=True)
-            n = piece.rows("unlit")
-            if n:
-                yield Samples(piece.column("unlit", "raster_x"), piece.column("unlit", "raster_y"), np.zeros((n, 3), np.float32), True)
-        for table, term in terms.items():
-            yield self._walks(piece, table, term, counted=False) if self.camera else self._paths(piece, table, term)
+            yield self.walks(piece).gathered()
+        yield from self.others(piece)
+
+    def walks(self, piece: Piece) -> Walks:
+        """The camera walks of a piece that have paths."""
+        term = next((term for term in self.layer.terms if term.table == "paths"), None)
+        return self._walks(piece, "paths", term)
+
+    def others(self, piece: Piece) -> Iterator[Samples]:
+        """Samples that are no such walks."""
+        n = piece.rows("unlit") if self.camera else 0
+        if n:
+            yield Samples(piece.column("unlit", "raster_x"), piece.column("unlit", "raster_y"), np.zeros((n, 3), np.float32), True)
+        for term in self.layer.terms:
+            if not self.camera:
+                yield self._paths(piece, term.table, term)
+            elif term.table != "paths":
+                yield self._walks(piece, term.table, term).gathered()._replace(counted=False)
 
     def _placed(self) -> set[str]:
         """The tables whose rows have a place on the film."""
         return {term.table for term in self.layer.terms} | ({"paths", "unlit"} if self.camera else set())
 
-    def _walks(self, piece: Piece, table: str, term: Term | None, counted: bool) -> Samples:
-        """One sample for each walk of a table."""
-        n = piece.rows(table)
-        x, y, color = np.empty(n, np.float32), np.empty(n, np.float32), np.empty((n, 3), np.float32)
-        if not n:
-            return Samples(x, y, color, counted)
-        chosen = np.zeros(n, np.bool_) if term is None else self.layer.chosen(piece, term)
+    def _walks(self, piece: Piece, table: str, term: Term | None) -> Walks:
+        """The walks of a table."""
+        chosen = np.zeros(piece.rows(table), np.bool_) if term is None else self.layer.chosen(piece, term)
         red, green, blue = (piece.column(table, f"contribution_{c}") for c in "rgb") if term is None else term.values(piece)
-        place = piece.column(table, "raster_x"), piece.column(table, "raster_y")
-        count = gather_samples(piece.column(table, "camera_walk"), chosen, *place, red, green, blue, x, y, color)
-        return Samples(x[:count], y[:count], color[:count], counted)
+        return Walks(piece.column(table, "camera_walk"), chosen, piece.column(table, "raster_x"), piece.column(table, "raster_y"), red, green, blue)
 
     def _paths(self, piece: Piece, table: str, term: Term) -> Samples:
         """One sample for each path."""

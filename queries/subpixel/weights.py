@@ -4,11 +4,13 @@ import dataclasses
 import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from queries.kernels.subpixel import splat_radial, splat_rows, splat_separable
+from queries.kernels.subpixel import splat_radial, splat_separable, splat_walks
+from queries.subpixel.samples import Walks
 from renderer.filters import ReconstructionFilter
 from renderer.filters.subpixel.filter import SubpixelFilter
 from renderer.filters.subpixel.layout import Layout
@@ -17,6 +19,7 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.floating]
 I64 = npt.NDArray[np.int64]
+Kind = TypeVar("Kind", bound=np.generic)
 
 PHASES = 512  # of a pixel, at least: linear in between, weights of the optimal filter are off by less than 1e-5 of the largest
 DISTANCES = 4096  # entries of a table by the distance's square
@@ -40,7 +43,10 @@ class Reach:
 
 @dataclass(frozen=True, eq=False)
 class WeightTables:
-    """What samples add to a display of ``width`` x ``height`` pixels: ``allocate`` makes sums, ``splat`` adds samples to them."""
+    """What samples add to a display of ``width`` x ``height`` pixels: ``allocate`` makes sums, ``splat`` adds samples to them.
+
+    ``splat_walks`` adds rows of ``paths``, walk by walk, where the filter takes but the samples of a subpixel's own row; else None.
+    """
 
     filter: SubpixelFilter
     width: int
@@ -51,6 +57,7 @@ class WeightTables:
     signed: bool
     rows_reached: int
     splat: Callable[..., None]
+    splat_walks: Callable[..., None] | None
 
     @property
     def layout(self) -> Layout:
@@ -76,9 +83,9 @@ class WeightTables:
         last = np.clip((int(high) // pixels + 1) * period + self.rows_reached, first, self.rows)
         return int(first), int(last)
 
-    def allocate(self, rows: int) -> F64:
-        """Sums of so many rows of positions."""
-        return np.zeros((self.channels, rows, self.columns))
+    def allocate(self, rows: int, kind: type[np.floating] = np.float64) -> Floats:
+        """Sums of so many rows of positions; of ``kind`` float32 only where there is ``splat_walks``."""
+        return np.zeros((self.channels, rows, self.columns), kind)
 
     def magnitudes(self) -> "WeightTables":
         """The tables of the weights' magnitudes."""
@@ -97,10 +104,10 @@ class WeightTables:
             found[row, self.pad + k :: self.period[row]][:count] = largest[which]
         return found
 
-    def to_lattice(self, values: F64) -> F64:
-        """Values of subpixels, (rows, columns) of sums, to positions: float64 (rows, columns); 0 where there is no subpixel."""
+    def to_lattice(self, values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
+        """Values of subpixels, (rows, columns) of sums, to positions: (rows, columns) of the same kind; 0 where there is no subpixel."""
         pattern_rows, pattern_columns = self.layout.pattern.shape
-        lattice = np.zeros((self.rows, self.width * self.layout.cells[0]))
+        lattice = np.zeros((self.rows, self.width * self.layout.cells[0]), values.dtype)
         for row, k, column in self._places():
             place = lattice[row::pattern_rows, column::pattern_columns]
             place[:] = values[row::pattern_rows, self.pad + k :: self.period[row]][:, : place.shape[1]]
@@ -122,7 +129,8 @@ def weight_tables(filter: SubpixelFilter, width: int, height: int) -> WeightTabl
     make = _radial if filter.down is None else _rows if _own_row(filter) else _separable
     added = make(filter, reach, first_down, center_down)
     splat = functools.partial(_splat, added, (width, height), pad, period)
-    return WeightTables(filter, width, height, pad, period, columns, added.signed, center_down.shape[1], splat)
+    by_walk = functools.partial(_splat_walks, added, (width, height), pad, period) if added.kernel is splat_walks else None
+    return WeightTables(filter, width, height, pad, period, columns, added.signed, center_down.shape[1], splat, by_walk)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,20 +138,35 @@ class _Added:
     """A kernel, its tables, the scratch that it needs, and whether some weights are negative."""
 
     kernel: Callable[..., None]
-    tables: tuple[object, ...]
+    tables: tuple[npt.NDArray[Any], ...]
     scratch: tuple[F64, ...]
     signed: bool
 
+    @functools.cached_property
+    def in_float32(self) -> tuple[npt.NDArray[Any], ...]:
+        """The tables, with real numbers in float32."""
+        return tuple(one.astype(np.float32) if one.dtype == np.float64 else one for one in self.tables)
 
-def _splat(added: _Added, size: tuple[int, int], pad: int, period: I64, x: Floats, y: Floats, rgb: F32, first_row: int, sums: F64) -> None:
+
+def _splat(added: _Added, size: tuple[int, int], pad: int, period: I64, x: Floats, y: Floats, rgb: F32, first_row: int, sums: Floats) -> None:
     """Add samples, at ``x`` and ``y`` in pixels and of colors (samples, 3), to sums of the rows of positions from ``first_row`` on."""
+    if added.kernel is splat_walks:
+        n = len(x)
+        _splat_walks(added, size, pad, period, Walks(np.arange(n, dtype=np.uint32), np.ones(n, np.bool_), x, y, *rgb.T), first_row, sums)
+        return
     scratch = [np.empty_like(one) for one in added.scratch]
     samples = (_read_only(one) for one in (x, y, rgb))
-    shown = (*sums.shape[1:], sums[0].ravel(), sums[1].ravel()) if added.kernel is splat_rows else (sums,)
-    added.kernel(*samples, *size, first_row, pad, period, *added.tables, *scratch, *shown)
+    added.kernel(*samples, *size, first_row, pad, period, *added.tables, *scratch, sums)
 
 
-def _read_only(values: Floats) -> Floats:
+def _splat_walks(added: _Added, size: tuple[int, int], pad: int, period: I64, walks: Walks, first_row: int, sums: Floats) -> None:
+    """The same for walks."""
+    rows: tuple[Any, ...] = tuple(_read_only(one) for one in walks)
+    tables = added.in_float32 if sums.dtype == np.float32 else added.tables
+    added.kernel(*rows, *size, first_row, pad, period, *tables, sums)
+
+
+def _read_only(values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
     """The same values as stored columns are: kernels are compiled for them once."""
     found = np.ascontiguousarray(values).view()
     found.flags.writeable = False
@@ -153,8 +176,7 @@ def _read_only(values: Floats) -> Floats:
 def _rows(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:
     """Weights across alone."""
     across = _across_table(filter, reach)
-    tables = (across.shape[2], across.ravel(), reach.first.ravel(), _shows(filter, reach).ravel())
-    return _Added(splat_rows, (*tables, (0,) * across.shape[-1]), (), bool((across[..., 0, :] < 0).any()))
+    return _Added(splat_walks, (across[0], reach.first[0], _shows(filter, reach)[0]), (), bool((across[..., 0, :] < 0).any()))
 
 
 def _separable(filter: SubpixelFilter, reach: Reach, first_down: I64, center_down: F64) -> _Added:

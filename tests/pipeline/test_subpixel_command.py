@@ -90,6 +90,9 @@ def test_image_is_shown_on_displays_of_its_own(picture: pathlib.Path, tmp_path: 
     for column in active:  # gray far from the edge, whatever the subpixel
         assert np.allclose(drive[:, column:24:12], 0.2, atol=1e-4)
     assert plane(tmp_path / "out/images/delta.exr").shape == (16, 60)
+    shown = [Image.open(tmp_path / f"out/pictures/{name}.png") for name in ("delta", "delta-standard")]
+    assert shown[0].size == shown[1].size
+    assert shown[0].tobytes() != shown[1].tobytes()
     assert "delta" in result.output
 
 

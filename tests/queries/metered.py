@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 import yaml
+from running import run_job
 from scipy import stats
-
-from pipeline.stages import run_job
 
 BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
 Description = dict[str, Any]

@@ -205,7 +205,7 @@ def test_regions_are_keys() -> None:
 
 @pytest.fixture(scope="module")
 def cornell(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    from pipeline.stages import run_job
+    from running import run_job
 
     place = tmp_path_factory.mktemp("cornell")
     scene = pathlib.Path(__file__).parents[2] / "configs" / "scenes" / "cornell.yaml"

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pytest
+from running import run_job, shared_kernels
 from synthetic import SyntheticRun, make_run
 from test_diagnostics_fireflies import luminance, plant
 
 from pipeline.deeper import run_scene, trace_again
-from pipeline.stages import run_job
 from queries import Run, open_run
 from queries.classify import select_all
 from queries.diagnostics import DIAGNOSTICS
@@ -238,9 +238,14 @@ def test_the_walk_of_an_outlier_traced_again_gives_its_path(real: pathlib.Path) 
         assert len(found) > 3
         settings, rows = opened.settings, []
         walks = np.array(sorted({line["walk"] for line in found}), np.uint64)
-        trace_again(
-            opened, walks, settings["max_depth"], run_scene(opened), lambda table, batch: rows.extend(batch.to_pylist() if table == "paths" else [])
-        )
+        with shared_kernels():  # those of the run: the same bits
+            trace_again(
+                opened,
+                walks,
+                settings["max_depth"],
+                run_scene(opened),
+                lambda table, batch: rows.extend(batch.to_pylist() if table == "paths" else []),
+            )
     again = {(row[owner(settings)], row["path"]): row for row in rows}
     for line in found:
         row = again[line["walk"], line["path"]]

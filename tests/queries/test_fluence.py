@@ -180,7 +180,7 @@ SCENES = {
 @pytest.fixture(scope="module")
 def lit(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Folders of rendered runs, by scene and method, each made when first asked for."""
-    from pipeline.stages import run_job
+    from running import run_job
 
     made: dict[tuple[str, str], pathlib.Path] = {}
 

@@ -3,7 +3,8 @@
 from itertools import product
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from words import word
 
@@ -71,7 +72,7 @@ PATHS = [
 ]
 
 
-@settings(max_examples=150, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@examples(150, HealthCheck.filter_too_much)
 @given(
     st.lists(
         st.sampled_from(["C", "D", "S", "L", "B", "R", ".", "'a'", "|", "|", "*", "(D|S)", "[DS]", "<RD>", "[^RD]", "CDL", "L*"]),

@@ -6,7 +6,8 @@ import time
 from typing import NamedTuple
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from words import matches, word
 
@@ -16,7 +17,7 @@ from queries.lpe.osl import parse
 from queries.lpe.printer import show
 from queries.lpe.syntax import PathEvent
 
-FIXED = settings(max_examples=150, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FIXED = examples(150)
 
 TABLE = [
     # where OSL surprises: the rows of the specification
@@ -308,7 +309,7 @@ def test_printing_and_parsing_are_inverse(expression: Sample) -> None:
     assert not any("OSL itself" in warning for warning in parse(shown).warnings)
 
 
-@settings(max_examples=500, derandomize=True, deadline=None)
+@examples(500)
 @given(
     st.one_of(
         st.text(max_size=40), st.text("CDSLGRTVOBxsXE.*+?{}[]()<>|&^-!@;'\\,0123456789ab \n", max_size=60), st.text("CD.'a[]()<>|^", max_size=60)

@@ -1,7 +1,8 @@
 """Short phrases and the expressions that they stand for: one and the same in both directions."""
 
 import pytest
-from hypothesis import given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from same_paths import same_paths
 
@@ -12,7 +13,7 @@ from queries.lpe.phrases import expression_of, phrase_of, read, words
 from queries.lpe.shapes import tree_of
 from queries.lpe.thesis import parse as parse_thesis
 
-FIXED = settings(max_examples=200, derandomize=True, deadline=None)
+FIXED = examples(200)
 
 # A phrase, its expression, and how else the same may be written.
 TABLE = [

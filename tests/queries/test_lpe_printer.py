@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from queries.errors import ExpressionError
@@ -29,7 +30,7 @@ from queries.lpe.syntax import (
     steps_of,
 )
 
-FIXED = settings(max_examples=150, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FIXED = examples(150)
 
 # --- random trees -------------------------------------------------------------------------------------------------
 
@@ -190,7 +191,7 @@ INTERACTIONS = [("R", "D", ()), ("R", "S", ("a",)), ("T", "S", ()), ("V", None, 
 WORDS = [[("C", None), *inner, ("L", None)] for length in range(4) for inner in product(INTERACTIONS, repeat=length)]
 
 
-@settings(FIXED, max_examples=60)
+@examples(60)
 @given(common_trees)
 def test_both_notations_match_the_same_paths(tree: Node) -> None:
     a, b = compile(show(tree)), compile(show(tree, "osl", source="std"), dialect="osl")

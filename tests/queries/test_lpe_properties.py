@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from words import matches
 
@@ -14,7 +15,7 @@ from queries.lpe.parser import parse
 from queries.lpe.printer import show
 from queries.lpe.syntax import PathEvent
 
-FIXED = settings(max_examples=80, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FIXED = examples(80)
 
 ATOMS = ["C", "L", "D", "S", "G", "s", ".", "R", "T", "V", "X", "'a'", "!'a'", "['a''b']", "[^'a']", "[DS]", "[^D]", "[^R]", "<RD>", "<TS'b'>",
          "<R.!'a'>", "<.x>", "<[RT][^D]>", "<..'a''b'>", "<R..>", r"'o\'b'"]  # fmt: skip
@@ -107,7 +108,7 @@ def test_predicates_read_light_first(items: list[str], light: str, word: tuple[P
     assert compile(f"({forward}) ^ ({backward})").dfa.states == 1
 
 
-@settings(max_examples=300, derandomize=True, deadline=None)
+@examples(300)
 @given(
     st.text("CDX.@!:;PQ'3.L*(|)[]{}<> \ud800\0", max_size=30),
     st.sampled_from(["", "noclamp;", "C.*"]),
@@ -125,7 +126,7 @@ def test_random_predicates_are_compiled_or_refused(text: str, before: str, suffi
             assert parse(compiled.show()).prefixes == compiled.prefixes
 
 
-@settings(max_examples=400, derandomize=True, deadline=None)
+@examples(400)
 @given(st.one_of(st.text(max_size=40), st.text("CDSLGRTVOBxsXE.*+?{}[]()<>|&^-!'\\,0123456789ab \n", max_size=40)))
 def test_random_text_is_compiled_or_refused(text: str) -> None:
     column = refusal_column(text)

@@ -1,10 +1,13 @@
 """Expressions over runs: what the SQL finds is what trying every path finds, and never nothing."""
 
+import functools
+import pathlib
+
 import pytest
 from synthetic import SyntheticRun
 from words import matches
 
-from queries import open_run
+from queries import Run, open_run
 from queries.errors import QueryError
 from queries.lpe import compile
 from queries.lpe.parser import parse
@@ -76,12 +79,17 @@ OF_ONE_METHOD = {
 }
 
 
+@functools.cache
+def opened(folder: pathlib.Path) -> Run:
+    """The run, opened once for all expressions."""
+    return open_run(folder)
+
+
 def found(run: SyntheticRun, text: str, table: str = "paths") -> list[tuple[int, int]]:
     """The (walk, path) keys that the SQL finds."""
-    with open_run(run.folder) as opened:
-        columns = "coalesce(p.camera_walk, p.light_walk) AS walk, p.path"
-        texts = {compile(text).sql(table, columns), compile(text).sql(table, columns, light_words=opened.light_words)}
-        answers = [sorted(opened.connection.execute(sql).fetchall()) for sql in texts]
+    columns = "coalesce(p.camera_walk, p.light_walk) AS walk, p.path"
+    texts = {compile(text).sql(table, columns), compile(text).sql(table, columns, light_words=opened(run.folder).light_words)}
+    answers = [sorted(opened(run.folder).connection.execute(sql).fetchall()) for sql in texts]
     assert all(answer == answers[0] for answer in answers)
     return answers[0]
 

@@ -4,7 +4,8 @@ import contextlib
 import time
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from examples import examples
+from hypothesis import given
 from hypothesis import strategies as st
 from same_paths import differ, same_paths
 
@@ -17,7 +18,7 @@ from queries.lpe.syntax import Chain, Node, Repeat, Step, Test, choice, sequence
 from queries.lpe.thesis import parse
 from queries.lpe.thesis_printer import show
 
-FIXED = settings(max_examples=80, derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+FIXED = examples(80)
 OBJECTS = {"j", "glass", "glass ball", "left_wall", "i", "lamp", "a}b", "q\\"}
 REGIONS = {"p", "spot", "my region"}
 
@@ -291,7 +292,7 @@ def refusal_column(text: str, objects: frozenset[str] | None, regions: frozenset
         return error.column, None
 
 
-@settings(max_examples=250, derandomize=True, deadline=None)
+@examples(250)
 @given(
     st.one_of(st.text(max_size=40), st.text("LOBDGSVXERT^_{}()|*+?,0123456789 p\\", max_size=40), wholes),
     st.sampled_from([None, frozenset({"p"}), frozenset(OBJECTS)]),

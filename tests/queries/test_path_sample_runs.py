@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from running import run_job
 from scenes.catalogue import thin_lens
 from stats import one_sample, sidak
 
-from pipeline.stages import run_job
 from queries import Run, open_run
 from queries.images import image
 from queries.path_sample import PathSample, sample_paths

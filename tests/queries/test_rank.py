@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from enumeration import OnePath, Point, paths_of_run, paths_of_synthetic, scatter
+from running import run_job
 from scipy import stats
 from synthetic import make_run
 
-from pipeline.stages import run_job
 from queries import Run, open_run, rank
 from queries.errors import QueryError
 from queries.images import aov_image

@@ -5,9 +5,9 @@ import pathlib
 
 import numpy as np
 import pytest
+from running import run_job
 from words import matches
 
-from pipeline.stages import run_job
 from queries import Run, open_run
 from queries.images import aov_image, image
 from queries.lpe import compile

@@ -9,8 +9,8 @@ import pytest
 import yaml
 from matplotlib.path import Path
 from region_scenes import CAMERA, mixed, quadric_hits, scene_of, triangle_hits
+from running import run_job
 
-from pipeline.stages import run_job
 from queries import Run, open_run
 from queries.errors import QueryError
 from queries.regions import Polygon, SceneGeometry, Stroke, region

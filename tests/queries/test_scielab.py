@@ -64,6 +64,24 @@ def test_equal_pictures_do_not_differ_and_order_does_not_matter() -> None:
     np.testing.assert_array_equal(scielab(a, b, DEGREES), scielab(b, a, DEGREES))
 
 
+def test_blurs_are_those_of_the_authors_software() -> None:
+    """It has full widths at half maximum, which differ from the paper's spreads by 6 % at most, and weights that are normalized to five digits."""
+    widths = ((0.05, 0.225, 7.0), (0.0685, 0.826), (0.0920, 0.6451))
+    weights = ((1.00327, 0.114416, -0.117686), (0.616725, 0.383275), (0.567885, 0.432115))
+    for blur, width, weight in zip(BLURS, widths, weights, strict=True):
+        assert [2.0 * np.sqrt(np.log(2.0)) * s for _, s in blur] == pytest.approx(width, rel=0.065)
+        assert [w / sum(v for v, _ in blur) for w, _ in blur] == pytest.approx(weight, abs=2e-3)
+
+
+def test_opponent_channels_of_white_and_of_primaries() -> None:
+    """White is light and hardly colored; red is on one side of green, blue of yellow."""
+    white, red, green, blue = (OPPONENT_OF_RGB @ np.array(color) for color in ((1, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    assert white == pytest.approx([0.871, -0.053, 0.037], abs=1e-3)
+    assert np.abs(white[1:]).max() < 0.1 * white[0]
+    assert red[1] < 0.0 < green[1]  # the software's red is negative
+    assert green[2] < 0.0 < blue[2]
+
+
 @pytest.mark.parametrize("channel", [0, 1, 2])
 @pytest.mark.parametrize(("down", "across"), [(0, 0), (0, 1), (0, 5), (3, 0), (4, 7)])
 def test_gratings_are_scaled_by_the_transfer_function(channel: int, down: int, across: int) -> None:

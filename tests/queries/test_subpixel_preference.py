@@ -117,6 +117,14 @@ def test_equal_methods_share_a_rank() -> None:
     assert [found[name]["stability"] for name in values] == [1.0] * 4
 
 
+def test_differences_of_rounding_are_none() -> None:
+    """A method that gives the same picture, but for the last digits of its scores, neither wins nor is better."""
+    optimal = example()["optimal"]
+    found = by_name(methods_ranked(scores({"optimal": optimal, "below": optimal - 1e-13, "above": optimal + 1e-13}), "rgb_stripe"))
+    for name in ("below", "above"):
+        assert (found[name]["rank"], found[name]["verdict"], found[name]["wins"], found[name]["stability"]) == (1, "not told apart", 0.0, 1.0)
+
+
 def test_few_images_give_no_verdict() -> None:
     few = {name: values[: FEWEST_IMAGES - 1] for name, values in example().items()}
     found = by_name(methods_ranked(scores(few), "rgb_stripe"))

@@ -7,6 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from queries.errors import QueryError
+from queries.subpixel.description import LayoutDescription
 from queries.subpixel.description import layout as layout_of
 from queries.subpixel.weighted_error import drive, weighted_error
 from renderer.filters.subpixel.derive import Kernels, derive
@@ -77,6 +78,14 @@ def test_error_is_that_of_the_definition(name: str, shape: tuple[int, int]) -> N
     for sensitivity in SENSITIVITIES.values():
         found = weighted_error(lattice, noise(shape), layout, VIEWING, sensitivity)
         assert found == pytest.approx(definition(lattice, noise(shape), layout, sensitivity), rel=1e-10)
+
+
+def test_frequencies_of_positions_that_are_not_square() -> None:
+    """Two across a pixel and one down; two rows of pixels are a period."""
+    layout = LayoutDescription(pattern=["R G B W", "B W R G"], cells=(2, 1)).layout("wide")
+    lattice = np.random.default_rng(5).normal(0.5, 0.5, (6, 8)).astype(np.float32)
+    expected = definition(lattice, noise((6, 8)), layout, exponential())
+    assert weighted_error(lattice, noise((6, 8)), layout, VIEWING, exponential()) == pytest.approx(expected, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", SIZES)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 from rendering import settings_of, with_all_features
-from scenes.catalogue import diffuse_box, plastics, textured_surfaces
+from scenes.catalogue import diffuse_box, plastics, textured_surfaces, thin_lens
 from scenes.mixed import mixed
 
 from renderer.integrators.minimal import MinimalPathTracer
@@ -22,7 +22,7 @@ from renderer.scene.arrays import Scene
 from renderer.scene.load import load_scene
 from renderer.settings import TraceSettings
 
-WALKS = 1000
+WALKS = 500
 Folder = pathlib.Path
 
 
@@ -31,20 +31,13 @@ def lit_by_sky_only(folder: Folder) -> dict[str, Any]:
     return {name: part for name, part in mixed().items() if name not in ("lamp", "ball", "bulb")}
 
 
-def seen_through_a_lens(folder: Folder) -> dict[str, Any]:
-    """The mixed scene out of focus and clipped."""
-    description = mixed()
-    description["sensor"] |= {"type": "thinlens", "aperture_radius": 0.1, "focus_distance": 3.0, "near_clip": 0.5, "far_clip": 6.0}
-    return description
-
-
 CASES: dict[str, tuple[Callable[[Folder], dict[str, Any]], dict[str, Any]]] = {
     "diffuse box": (diffuse_box, {}),
     "mixed": (lambda _: mixed(), {}),
     "mixed with early roulette": (lambda _: mixed(), {"rr_depth": 1}),
     "direct light only": (lambda _: mixed(), {"max_depth": 2}),
     "sky": (lit_by_sky_only, {}),
-    "thin lens": (seen_through_a_lens, {}),
+    "thin lens": (thin_lens, {}),
     "plastics": (plastics, {}),
     "textures": (textured_surfaces, {}),
 }
@@ -54,7 +47,7 @@ def case(name: str, folder: Folder) -> tuple[Scene, TraceSettings, np.ndarray]:
     """Scene, settings and walks of a case."""
     make, changes = CASES[name]
     scene = load_scene(make(folder))
-    if name != "diffuse box":
+    if name not in ("diffuse box", "thin lens"):  # which have specializations of their own
         scene = with_all_features(scene)
     settings = settings_of(scene, 8, **changes)
     return scene, settings, np.sort(np.random.default_rng(5).choice(settings.walks, WALKS, replace=False)).astype(np.uint64)

@@ -63,7 +63,8 @@ def images(description: Dict, samples: int, method: str, **changes: Any) -> F64:
     return replicate_images(loaded, settings_of(loaded, samples * REPLICATES, method, **changes), REPLICATES)
 
 
-LONG = ("thin_lens", "through_rough_glass")
+# Shorter tests below compare the same scenes: the box by filters, the shapes by depths, the glass with roulette.
+LONG = ("diffuse_box", "glowing_shapes", "thin_lens", "through_rough_glass")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in SCENES])

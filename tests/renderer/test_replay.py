@@ -48,7 +48,8 @@ def assert_same_rows(found: Tables, expected: Tables, walks: np.ndarray) -> None
     for name in expected:
         if name != "words":
             want = rows_of(expected[name], walks)
-            assert found[name].num_rows == want.num_rows > 0
+            assert found[name].num_rows == want.num_rows
+            assert want.num_rows > 0 or (name == "unlit" and len(walks) < 100), "of a few walks all may find light"
             for column in want.column_names:
                 a, b = found[name][column].to_numpy(), want[column].to_numpy()
                 assert a.tobytes() == b.tobytes(), f"{name}.{column} differs in {(a != b).sum()} of {len(a)} rows"

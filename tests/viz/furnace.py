@@ -7,9 +7,8 @@ import pathlib
 
 import numpy as np
 import yaml
+from running import run_job
 from scenes.parts import area, camera, diffuse, move, scale, scene, shape, turn
-
-from pipeline.stages import run_job
 
 KD, LE = np.array([0.3, 0.6, 0.4]), np.array([2.0, 1.0, 0.5])
 RADIANCE = LE / (1 - KD)

@@ -9,8 +9,8 @@ import pytest
 import pyvista
 import yaml
 from pydantic import ValidationError
+from running import run_job
 
-from pipeline.stages import run_job
 from queries import Run, open_run
 from queries.errors import QueryError
 from queries.path_sample import sample_paths

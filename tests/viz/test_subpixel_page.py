@@ -168,6 +168,7 @@ def test_names_are_told_and_not_obeyed(folder: pathlib.Path, page: Page) -> None
     text = (folder / "index.html").read_text("utf-8")
     assert EVIL not in text
     assert "default-src 'self'" in text
+    assert 'data-x="108" data-y="72"' in text  # close views begin in the middle of 12 x 8 pixels, 18 of the screen's for each
     assert page.tags.count("script") == 3
     for told in (EVIL, "A <view>", "Fig. 4.3 shows <nine>.", "--layout <x>", "what & where"):
         assert told in page.text

@@ -115,7 +115,7 @@ def compared(found: Influence, description: SubpixelDescription) -> tuple[Agreem
     if not insignificant:
         text += " The spectra tell why: on this display kernels from other channels are neither narrow nor weak."
     elif not faint:
-        text += " It lies near the pixel Nyquist frequency, where these kernels peak and where the viewer sees little."
+        text += " It lies near the pixel Nyquist frequency and along sharp edges: where these kernels peak the viewer sees little."
     if not same_viewer(description):
         text += " The thesis's viewer is another one, so its bands lie at other frequencies."
     return ("agrees" if insignificant and faint else "differs"), text

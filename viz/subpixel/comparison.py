@@ -141,7 +141,8 @@ def compared_methods(points: Mapping[str, F64], rows: Sequence[Mapping[str, Any]
         return "not comparable", f"{text} {_few(count)}"
     missed = {name: paired(unlimited[OPTIMAL], unlimited[name]) for name in there if name not in better}
     if missed:
-        text += f" On a display without limits, where nothing is clipped, it would be {_listed_tests(missed)}."
+        blame = "clipping alone keeps it from that" if all(test.better for test in missed.values()) else "clipping alone is not why"
+        text += f" Where nothing is clipped: {_listed_tests(missed)}; {blame}."
     return ("agrees" if len(better) == len(STUDIED) else "differs"), f"{text} A test over images, not people."
 
 

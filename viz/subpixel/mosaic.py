@@ -72,10 +72,9 @@ def as_picture(light: Floating) -> U8:
 def pixel_light(lattice: Floating, layout: Layout) -> F32:
     """The light of a display as it is seen where subpixels melt into one another, linear RGB, float32 (height, width, 3); drives are cut to [0, 1].
 
-    At each pixel: the mean drive of each primary in the period around the pixel's center, times the primary's light.
+    At each pixel: the mean drive of each primary in the period around the pixel's center, times the primary's light; where a period has several
+    pixels, with weights that fall linearly, so that a primary that they share is interpolated.
     """
-    from scipy.ndimage import uniform_filter
-
     # A period more on all sides, so that periods around pixels at the edges are whole
     rows, columns = (_extended(size, period) for size, period in zip(lattice.shape, layout.pattern.shape, strict=True))
     of = layout.pattern.astype(np.int8)[rows[:, None] % layout.pattern.shape[0], columns % layout.pattern.shape[1]]
@@ -86,11 +85,20 @@ def pixel_light(lattice: Floating, layout: Layout) -> F32:
     light = np.zeros((*drive[centers].shape, 3), np.float32)
     for primary, color in enumerate(layout.light()):
         here = of == primary
-        sums = uniform_filter(np.where(here, drive, np.float32(0)), layout.pattern.shape, mode="constant")[centers]
-        share = uniform_filter(here.astype(np.float32), layout.pattern.shape, mode="constant")[centers]
+        sums = _weighed(np.where(here, drive, np.float32(0)), layout)[centers]
+        share = _weighed(here.astype(np.float32), layout)[centers]
         mean = np.divide(sums, share, out=np.zeros_like(sums), where=share > 1e-6)
         light += mean[..., None] * color.astype(np.float32)
     return light
+
+
+def _weighed(values: F32, layout: Layout) -> F32:
+    """Means over the period around each position, float32 (rows, columns); along axes where that is several pixels, their means once more: a tent."""
+    from scipy.ndimage import uniform_filter
+
+    sizes = [period if period > cells else 1 for period, cells in zip(layout.pattern.shape, layout.cells[::-1], strict=True)]
+    boxes = uniform_filter(values, layout.pattern.shape, mode="constant")
+    return np.asarray(uniform_filter(boxes, sizes, mode="constant", origin=[-1 if size % 2 == 0 else 0 for size in sizes]), np.float32)
 
 
 def _extended(size: int, period: int) -> npt.NDArray[np.int64]:

@@ -92,8 +92,8 @@ def fit_table(analysis: Analysis) -> Table:
         Column("b", "b", "how wide its window is, squared positions", "number"),
         Column("rms", "rms", "root mean square of the kernel’s difference from the filter; the thesis states less than 0.02", "number"),
         Column("relative", "relative", "the same in units of the kernel’s own root mean square", "number"),
-        Column("thesis_a", "a, Table 4.1", "as the thesis states it, of the same units", "number"),
-        Column("thesis_b", "b, Table 4.1", "as the thesis states it, of the same units", "number"),
+        Column("thesis_a", "thesis’s a", "as its Table 4.1 states it, of the same units", "number"),
+        Column("thesis_b", "thesis’s b", "as its Table 4.1 states it, of the same units", "number"),
         Column("agreement", "agreement", "of a within 2 % and of b within 5 %, where the display is seen at the thesis’s frequencies", "words"),
     ]
     return Table("Analytic filters: parameters, fit, and the thesis’s Table 4.1", columns, [_fit_row(row) for row in fit_rows(analysis)])

@@ -95,7 +95,7 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
     file = save_panels(figure, folder / f"spectra_{layout.name}.png")
 
     agreement, comparison = compared(display, description, found)
-    cut = "" if layout.one_dimensional else f" The section through the two-dimensional spectra{along} is shown."
+    cut = "" if layout.one_dimensional else f" Shown is the section of the two-dimensional spectra{along[1:]}."
     return Figure(
         name=f"spectra_{layout.name}",
         title=f"Spectra of the kernels of {title}",
