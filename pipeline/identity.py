@@ -5,7 +5,7 @@ import hashlib
 import importlib.metadata
 import json
 import platform
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields
 from typing import Any
 
 import llvmlite.binding  # type: ignore[import-untyped]
@@ -19,6 +19,7 @@ from renderer.settings import UNBOUNDED_DEPTH, TraceSettings
 
 MAX_WALKS = 2**40
 _PACKAGES = ("pathspace", "numpy", "numba", "llvmlite", "embreex", "trimesh", "OpenImageIO", "pyarrow", "duckdb", "scipy")
+_DEFAULTS: dict[str, Any] = {field.name: field.default for field in fields(TraceSettings) if field.default is not MISSING}
 
 
 def trace_settings(job: Job, scene: Scene) -> TraceSettings:
@@ -101,8 +102,8 @@ def processor() -> str:
 
 
 def differences(old: dict[str, Any], new: dict[str, Any]) -> str:
-    """In words, how two fingerprints differ; empty where they do not."""
-    before, after = old.get("settings", {}), new["settings"]
+    """In words, how two fingerprints differ; empty where they do not. A setting that an older program did not have stands for its default."""
+    before, after = {**_DEFAULTS, **old.get("settings", {})}, new["settings"]
     parts = [f"{key} {before.get(key)!r} -> {after.get(key)!r}" for key in after if before.get(key) != after.get(key)]
     if old.get("scene") != new["scene"]:
         parts.append("the scene")

@@ -30,7 +30,6 @@ F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.floating]
 Window = tuple[int, int, int, int]
-MOST_IN_FLOAT32 = 16.0  # samples of a pixel that a shard adds up in float32, to within about 1e-6 of the sum of their magnitudes
 _MARGIN = 1  # pixels around a window, for cells that take the mean of their neighbors
 
 
@@ -62,7 +61,7 @@ def resolve(
 
 def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDArray[np.bool_] | None = None) -> Floats:
     """Sums of all samples. ``wanted``: rows of positions, bool; of others, some samples may be left out."""
-    sums = tables.allocate(tables.rows)
+    sums = tables.allocate(tables.rows, tables.precision(source.expected))
     work = functools.partial(_sum_shard, source, tables, wanted)
     for first, part in map_shards(source.run.files(*source.tables), work, threads):
         sums[:, first : first + part.shape[1]] += part
@@ -79,8 +78,7 @@ def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.
             kept = [i for i, band in enumerate(bands) if wanted[slice(*band)].any()]
             there, bands = [there[i] for i in kept], [bands[i] for i in kept]
         first, last = min((low for low, _ in bands), default=0), max((high for _, high in bands), default=0)
-    few = source.most <= MOST_IN_FLOAT32 and tables.splat_walks is not None
-    sums, beside = tables.allocate(last - first, np.float32 if few else np.float64), None
+    sums, beside = tables.allocate(last - first, tables.precision(source.most)), None
     while there:
         piece = there.pop(0)
         if tables.splat_walks and source.camera:

@@ -25,6 +25,7 @@ PHASES = 512  # of a pixel, at least: linear in between, weights of the optimal 
 DISTANCES = 4096  # entries of a table by the distance's square
 _BESIDE = 1e-9  # pixels: weights are taken so far inside of a phase, so that a box that ends at one is exact
 _PLACES, _ABOVE = 24, 1.05  # places in a pixel along each axis where weights are looked at, and what is added for those between
+MOST_IN_FLOAT32 = 16.0  # samples of a pixel that are added up in float32, to within about 1e-6 of the sum of their magnitudes
 _VECTOR = 4  # subpixels in reach are rounded up to this
 
 
@@ -82,6 +83,10 @@ class WeightTables:
         first = np.clip(int(low) // pixels * period - self.rows_reached, 0, self.rows)
         last = np.clip((int(high) // pixels + 1) * period + self.rows_reached, first, self.rows)
         return int(first), int(last)
+
+    def precision(self, samples: float) -> type[np.floating]:
+        """In what sums of so many samples of each pixel are kept."""
+        return np.float32 if self.splat_walks and samples <= MOST_IN_FLOAT32 else np.float64
 
     def allocate(self, rows: int, kind: type[np.floating] = np.float64) -> Floats:
         """Sums of so many rows of positions; of ``kind`` float32 only where there is ``splat_walks``."""
@@ -168,6 +173,8 @@ def _splat_walks(added: _Added, size: tuple[int, int], pad: int, period: I64, wa
 
 def _read_only(values: npt.NDArray[Kind]) -> npt.NDArray[Kind]:
     """The same values as stored columns are: kernels are compiled for them once."""
+    if values.flags.c_contiguous and not values.flags.writeable:
+        return values
     found = np.ascontiguousarray(values).view()
     found.flags.writeable = False
     return found

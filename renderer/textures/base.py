@@ -35,7 +35,7 @@ class Memory(NamedTuple):
     """The last filtered color of each pixel, for walks that meet the same triangle there; a tracer's own."""
 
     width: Any  # int64, of the film, pixels
-    key: npt.NDArray[np.int64]  # (slots, 2) pixel, -1 for none; triangle and texture
+    key: npt.NDArray[np.int64]  # (slots, 2) one more than the pixel, 0 for none; triangle and texture
     rgb: npt.NDArray[np.float32]  # (slots, 3)
 
 

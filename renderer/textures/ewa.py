@@ -338,7 +338,7 @@ def average(ewa: Ewa, textures: Textures, index: Index, s: np.float32, t: np.flo
             size_g += np.float64(abs(w[1]))
             size_b += np.float64(abs(w[2]))
 
-    # Weighted means, never below zero: no light is negative
+    # Weighted means, never below zero: a path has no negative light. Samples of a pixel that share a color would be cut off there anyway
     base = level_of(ewa, textures, index, 0)
     r, g, b = between_texels(base, mode, s * size_s, t * size_t)
     if weight_r > LEAST_SHARE * size_r:
@@ -365,9 +365,9 @@ def remembered(
         return average(ewa, textures, index, s, t, j, row, column)
     pixel = np.int64(pixel_y) * memory.width + np.int64(pixel_x)
     slot = pixel % memory.key.shape[0]
-    if memory.key[slot, 0] != pixel or memory.key[slot, 1] != what:
+    if memory.key[slot, 0] != pixel + 1 or memory.key[slot, 1] != what:
         r, g, b = average(ewa, textures, index, s, t, j, row, column)
-        memory.key[slot, 0] = pixel
+        memory.key[slot, 0] = pixel + 1
         memory.key[slot, 1] = what
         memory.rgb[slot, 0] = r
         memory.rgb[slot, 1] = g

@@ -38,9 +38,9 @@ def running_integral(filter: ReconstructionFilter, reach: float) -> F32:
 
 
 def by_distance(filter: ReconstructionFilter, reach: float) -> F32:
-    """A filter at ``ENTRIES`` + 1 distances up to ``reach`` pixels."""
+    """A filter at ``ENTRIES`` + 1 distances up to ``reach`` pixels; zero from its radius on, as tables go on with their last entry."""
     x = np.linspace(0.0, reach, ENTRIES + 1)
-    return np.where(x <= filter.radius, filter.weight(x), 0.0).astype(np.float32)
+    return np.where(x < filter.radius, filter.weight(x), 0.0).astype(np.float32)
 
 
 def distinct(tables: Sequence[F32]) -> tuple[F32, npt.NDArray[np.int32]]:
@@ -148,10 +148,13 @@ def without_ewa(scene: Scene) -> Scene:
 
 
 def with_memory(arrays: SceneArrays) -> SceneArrays:
-    """The same arrays with a memory for one thread: with a pinhole, all samples of a pixel that meet a triangle have one color."""
+    """The same arrays with a memory for one thread: with a pinhole, all samples of a pixel that meet a triangle have one color.
+
+    Its pages are the system's until a pixel that shows a bitmap is written to: 28 bytes for each of them.
+    """
     sensor = arrays.sensor
     if arrays.ewa is None or sensor.lens_radius is not None:
         return arrays
     slots = min(int(sensor.width) * int(sensor.height), MOST_SLOTS)
-    memory = Memory(np.int64(sensor.width), np.full((slots, 2), -1, np.int64), np.zeros((slots, CHANNELS), np.float32))
+    memory = Memory(np.int64(sensor.width), np.zeros((slots, 2), np.int64), np.zeros((slots, CHANNELS), np.float32))
     return arrays._replace(ewa=arrays.ewa._replace(memory=memory))

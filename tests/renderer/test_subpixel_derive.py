@@ -415,6 +415,10 @@ def test_other_arguments_that_make_no_sense_are_refused() -> None:
     for frequency, weights in (([0, 0], [[1, 1]] * 3), ([0, 1], [[1, 1]] * 2), ([], [[]] * 3), ([0, float("nan")], [[1, 1]] * 3)):
         with pytest.raises(ValueError, match="ascending frequencies"):
             csf.table(frequency, weights)
-    for row in ([-1.0], [float("nan")], [0.0]):
+    with pytest.raises(ValueError, match="as many weights"):
+        csf.table([0.0, 1.0], [[1.0, 1.0], [1.0, 1.0], [1.0]])
+    for value in (-1.0, float("nan"), 0.0):
+        with pytest.raises(ValueError, match="some that are positive"):
+            csf.table([0.0], [[value]] * 3)
         with pytest.raises(ValueError, match="non-negative"):
-            derive(display, sensitivity=csf.table([0.0], [row] * 3))
+            derive(display, sensitivity=csf.Sensitivity("odd", (lambda f, value=value: np.full_like(f, value),) * 3))

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from running import run_job
 
+from pipeline.stages import run_job
 from queries.regions import SceneGeometry
 
 CONFIGS = pathlib.Path(__file__).parent.parent.parent / "configs"
@@ -16,7 +16,7 @@ NOTHING_ELSE = ("aovs={}", "rank={}", "views={}", "report=null", "inspection=nul
 
 def small_run(name: str, folder: pathlib.Path, *overrides: str) -> pathlib.Path:
     """A run of one of the project's jobs, 32 x 32 pixels of 4 samples, in a new folder."""
-    given = ("render.resolution=[32, 32]", "render.samples=4", "render.sampler=independent", *NOTHING_ELSE, *overrides)
+    given = ("render.resolution=[32, 32]", "render.samples=4", *NOTHING_ELSE, *overrides)
     return run_job(CONFIGS / f"{name}.yaml", given, out=folder / name, threads=2).path
 
 

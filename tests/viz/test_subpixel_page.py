@@ -279,6 +279,7 @@ def test_marks_of_scores() -> None:
 def test_singular_systems_are_told(tmp_path: pathlib.Path) -> None:
     found = analysis(False)
     assert not any("singular" in text for text in warnings(found))
+    assert condition_table(found).rows[0][3].text == "3.95"  # of 8 pixels at 31.61 a degree
     display = found.displays[0]
     narrow = derive(display.layout, sensitivity=box((4.0, 1.0, 1.0)), size=(1, 24))
     assert narrow.singular

@@ -21,8 +21,8 @@ cross kernels, which analytic filters leave out.
 The clamp costs more than the fit does, in one dimension as in two. Fitted Gaussians are still at 0.5 to 0.6 at the stripe's second zero, where the
 filter ends, and narrower ones would leave less to cut off. Over the project's test images (means of S-CIELAB and of the weighted error), the
 stripe has 1.87 and 0.0188 as fitted, and would have 1.78 and 0.0164 with b = 4 spacing²; RGBW has 1.81 and 0.0176, and would have 1.75 and 0.0150
-with a = pi / 2 and b = 8, but 1.99 and 0.0177 with that a and b fitted. A third zero takes the stripe's error to 0.0150, but drives more subpixels
-far below black around white text, and S-CIELAB to 2.01. Coefficients stay those of the fit to the kernels, as the thesis has them.
+with a = pi / 2 and b = 8, but 1.99 and 0.0177 with that a and b fitted. A third zero takes the stripe's weighted error, which
+knows no clipping, to 0.0150, but S-CIELAB of what is clipped to 2.01. Coefficients stay those of the fit to the kernels, as the thesis has them.
 """
 
 import dataclasses
