@@ -265,8 +265,10 @@ def subpixel(
 ) -> None:
     """Filter a run's samples, or an image, for the subpixels of a display, and compare the ways to do so."""
     with _clear_exit():
+        from pipeline.progress import log_to_stderr
         from pipeline.subpixel import list_layouts, print_analysis
 
+        log_to_stderr()
         if list_them:
             list_layouts()
         elif target is None:

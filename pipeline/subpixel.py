@@ -13,10 +13,11 @@ from pipeline.errors import JobError
 from pipeline.files import FileRecord, checksum, clear_errors, is_whole, new_file, write_json
 from pipeline.images import write_plane
 from pipeline.job_file import checked_subpixel
+from pipeline.progress import LOG
 from pipeline.run_folder import RunFolder
 from queries.errors import QueryError
 from queries.regions import parse_region
-from queries.run import open_run
+from queries.run import Run, open_run
 from queries.sql import write
 from queries.subpixel.description import SubpixelDescription, read_layout, shipped_layouts
 
@@ -45,9 +46,16 @@ def write_job_analysis(folder: RunFolder, asked: SubpixelDescription, known: Map
         return dict(known)
     target = folder.path / FOLDER
     with open_run(folder.path, threads=threads) as run:
+        _warn_of_blur(run)
         write_analysis(analyze(RunSource(run, threads=threads), asked), target, f"pathspace subpixel {folder.path.name}")
     written = sorted(file for file in target.rglob("*") if file.is_file())
     return question | {"checksums": {file.relative_to(folder.path).as_posix(): FileRecord(0, *checksum(file)).as_json() for file in written}}
+
+
+def _warn_of_blur(run: Run) -> None:
+    """Bitmaps that were filtered while rendering are blurred once more."""
+    if run.settings.get("texture_filter") == "ewa":
+        LOG.warning("warning: `%s` was rendered with texture_filter: ewa, so its bitmaps are filtered already and get blurred once more", run.path)
 
 
 # --- as files -----------------------------------------------------------------------------------------------------
@@ -166,6 +174,7 @@ def print_analysis(
         with open_run(target, regions=dict(map(parse_region, define))) as run:
             job = (run.manifest.get("job") or {}).get("analysis") or {}
             asked = _described(job.get("subpixel") or {}, layouts, given, settings)
+            _warn_of_blur(run)
             analysis = analyze(RunSource(run, run.compile(expression) if expression else None), asked)
     else:
         if expression is not None or define:

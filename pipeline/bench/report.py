@@ -105,6 +105,13 @@ def write_charts(out: pathlib.Path, session: Session, results: Mapping[str, Sect
         times = [TimeBar(what, wall.median, wall.low, wall.high, what in asked) for what, wall in walls.items()]
         time_chart(out / "questions.png", times, f"Questions of {figures['paths'] / 1e6:.1f} million paths")
         charts["questions"] = "questions.png"
+    if "subpixel" in results:
+        from viz.subpixel.cost import Cost, cost_chart
+
+        figures = results["subpixel"].figures
+        found = [Cost(c["layout"], c["method"], spread(c["seconds"]).median, c["scielab"]) for c in figures["costs"]]
+        cost_chart(out / "subpixel.png", found, "Cost and accuracy of the methods", f"seconds for {where.split(': ')[1].split(',')[0]}")
+        charts["subpixel"] = "subpixel.png"
     return charts
 
 

@@ -38,16 +38,17 @@ def measure_subpixel(session: Session) -> SectionResult:
     derivation = spread(walls[DERIVE])
     most = asked.most_derivation_seconds
     rows.append(Row("deriving and fitting the filters of all layouts", f"≤ {most:g} s", derivation.text(".2f", " s"), derivation.median <= most))
-    cells = []
+    cells, costs = [], []
     for layout, method in itertools.product(asked.layouts, asked.methods):
-        taken = walls[_name(layout, method)]
-        cells.append([layout, method, spread(taken).text(".2f", " s"), f"{ratio(taken, walls[BOX]).median:.2f} ×", f"{scores[layout][method]:.2f}"])
+        taken, score = walls[_name(layout, method)], scores[layout][method]
+        cells.append([layout, method, spread(taken).text(".2f", " s"), f"{ratio(taken, walls[BOX]).median:.2f} ×", f"{score:.2f}"])
+        costs.append({"layout": layout, "method": method, "seconds": taken, "scielab": score})
     table = markdown_table(["display", "method", "wall time, median (range)", "of the box image", "mean S-CIELAB difference"], cells)
     note = (
         f"{film}; {folder.paths:,} paths; the box image takes {spread(walls[BOX]).text('.2f', ' s')}. Times are whole resolves of the run, for every "
         "subpixel of the display; S-CIELAB is the mean over the project's own test images."
     )
-    figures = {"wall_seconds": walls, "scielab": scores, "paths": folder.paths}
+    figures = {"wall_seconds": walls, "costs": costs, "paths": folder.paths}
     return SectionResult(rows, figures, [table, note])
 
 

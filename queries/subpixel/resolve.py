@@ -61,7 +61,7 @@ def resolve(
 
 def _sum(source: SampledRun, tables: WeightTables, threads: int, wanted: npt.NDArray[np.bool_] | None = None) -> Floats:
     """Sums of all samples. ``wanted``: rows of positions, bool; of others, some samples may be left out."""
-    sums = tables.allocate(tables.rows, tables.precision(source.expected))
+    sums = tables.allocate(tables.rows, tables.precision(source.expected if source.camera else np.inf))
     work = functools.partial(_sum_shard, source, tables, wanted)
     for first, part in map_shards(source.run.files(*source.tables), work, threads):
         sums[:, first : first + part.shape[1]] += part
@@ -78,7 +78,7 @@ def _sum_shard(source: SampledRun, tables: WeightTables, wanted: npt.NDArray[np.
             kept = [i for i, band in enumerate(bands) if wanted[slice(*band)].any()]
             there, bands = [there[i] for i in kept], [bands[i] for i in kept]
         first, last = min((low for low, _ in bands), default=0), max((high for _, high in bands), default=0)
-    sums, beside = tables.allocate(last - first, tables.precision(source.most)), None
+    sums, beside = tables.allocate(last - first, tables.precision(source.most if source.camera else np.inf)), None
     while there:
         piece = there.pop(0)
         if tables.splat_walks and source.camera:
@@ -138,7 +138,7 @@ def _grid_shard(source: SampledRun, window: Window, cells: tuple[int, int], offs
     if source.banded:
         spans = [source.heights(piece) for piece in there]
         there = [piece for piece, (low, high) in zip(there, spans) if low < bottom + 1 and high >= top - 1]
-        low, high = min(low for low, _ in spans), max(high for _, high in spans)
+        low, high = min((low for low, _ in spans), default=0.0), max((high for _, high in spans), default=0.0)
         first = int(np.clip((np.floor(min(low, bottom)) - top) * down - 1 - np.ceil(offset[1]), 0, rows))
         last = int(np.clip((np.floor(max(high, -1)) + 1 - top) * down + 1 - np.floor(offset[1]), first, rows))
     sums = np.zeros((last - first, (right - left) * across, 4))

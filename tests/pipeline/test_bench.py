@@ -285,3 +285,16 @@ def test_a_contender_that_failed_once_is_not_tried_again(tmp_path: pathlib.Path,
 def test_errors_that_are_not_positive_are_left_off_the_chart(tmp_path: pathlib.Path) -> None:
     error_chart(tmp_path / "a.png", [ErrorCurve("a", [1.0, 2.0], [0.1, -0.1], [1, 2]), ErrorCurve("b", [1.0], [0.0], [1])], "errors")
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_subpixel_section_times_every_method_and_draws_a_chart(tmp_path: pathlib.Path) -> None:
+    file = write_benchmark(tmp_path, "sections: [subpixel]\nsubpixel: {layouts: [rgb_stripe], methods: [pixel_box, optimal]}\n")
+    assert main(file, tmp_path / "out", ()) == 0
+    results = json.loads((tmp_path / "out/results.json").read_bytes())
+    costs = results["sections"]["subpixel"]["costs"]
+    assert [(cost["layout"], cost["method"]) for cost in costs] == [("rgb_stripe", "pixel_box"), ("rgb_stripe", "optimal")]
+    assert costs[1]["scielab"] < costs[0]["scielab"]
+    assert all(len(cost["seconds"]) == 2 and min(cost["seconds"]) > 0 for cost in costs)
+    assert len(results["rows"]) == 2
+    assert (tmp_path / "out/subpixel.png").stat().st_size > 5000

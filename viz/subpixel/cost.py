@@ -40,16 +40,8 @@ def cost_figure(analysis: Analysis, folder: pathlib.Path) -> Figure | None:
     found = costs(analysis.scores) if analysis.scores is not None else []
     if not found:
         return None
-    layouts = list(dict.fromkeys(cost.layout for cost in found))
-    columns = min(2, len(layouts))
-    rows = -(-len(layouts) // columns)
-    figure, panels = new_panels(rows, columns, 0.8 + 2.5 * rows, "Cost and accuracy of the methods", sharex=True)
-    seconds = [cost.seconds for cost in found]
-    panels[0, 0].set_xlim(min(seconds) / 1.5, max(seconds) * 1.5)
-    for layout, axes in zip(layouts, panels.ravel(), strict=False):
-        _draw_panel(axes, layout, [cost for cost in found if cost.layout == layout])
-    label_panels(panels, len(layouts), "seconds for each picture", "mean S-CIELAB difference")
-    file = save_panels(figure, folder / "cost.png")
+    file = cost_chart(folder / "cost.png", found, "Cost and accuracy of the methods", "seconds for each picture")
+    layouts = {cost.layout for cost in found}
     agreement, comparison = compared(found, next((d.layout.name for d in analysis.displays if family(d.layout) == "RGB"), ""))
     fastest = min(found, key=lambda cost: cost.seconds)
     return Figure(
@@ -66,6 +58,20 @@ def cost_figure(analysis: Analysis, folder: pathlib.Path) -> Figure | None:
         agreement=agreement,
         comparison=comparison,
     )
+
+
+def cost_chart(file: pathlib.Path, found: Sequence[Cost], title: str, unit: str) -> pathlib.Path:
+    """S-CIELAB over seconds, of which ``unit`` says what they are for: a panel for each display, a marker for each method. Writes a PNG."""
+    layouts = list(dict.fromkeys(cost.layout for cost in found))
+    columns = min(2, len(layouts))
+    rows = -(-len(layouts) // columns)
+    figure, panels = new_panels(rows, columns, 0.8 + 2.5 * rows, title, sharex=True)
+    seconds = [cost.seconds for cost in found]
+    panels[0, 0].set_xlim(min(seconds) / 1.5, max(seconds) * 1.5)
+    for layout, axes in zip(layouts, panels.ravel(), strict=False):
+        _draw_panel(axes, layout, [cost for cost in found if cost.layout == layout])
+    label_panels(panels, len(layouts), unit, "mean S-CIELAB difference")
+    return save_panels(figure, file)
 
 
 def costs(scores: pa.Table) -> list[Cost]:
