@@ -80,31 +80,6 @@ def layouts_ranked(scores: pa.Table, method: str = "optimal", against: str | Non
     return _ranked(values, "layout", reference, columns)
 
 
-def layout_pairs(scores: pa.Table, method: str = "optimal") -> pa.Table:
-    """Every pair of displays, by one method: the first's S-CIELAB difference minus the second's."""
-    values = _pivot(scores, "layout", {"method": method})
-    pairs = [(a, b) for i, a in enumerate(values.names) for b in values.names[i + 1 :]]
-    differences = np.stack([values.of(a) - values.of(b) for a, b in pairs]) if pairs else np.empty((0, values.count))
-    low, high = interval(differences)
-    columns = (
-        Figure("first", TEXT, "one display"),
-        Figure("second", TEXT, "the other"),
-        Figure("difference", REAL, f"S-CIELAB difference of the first minus that of the second, by `{method}`: negative where the first is better"),
-        *INTERVAL,
-        COUNT,
-    )
-    found = {
-        "first": [a for a, _ in pairs],
-        "second": [b for _, b in pairs],
-        "difference": differences.mean(axis=1),
-        "difference_low": low,
-        "difference_high": high,
-        "verdict": [_verdict(a, b, values.count) for a, b in zip(low, high)],
-        "images": [values.count] * len(pairs),
-    }
-    return answer(columns, found)
-
-
 def interval(values: F64) -> tuple[F64, F64]:
     """The expanded percentile interval of the mean of each row of ``values`` (rows, images); NaN with fewer images than ``FEWEST_IMAGES``."""
     n = values.shape[1]

@@ -2,11 +2,13 @@
 
 import json
 import pathlib
+import re
 import shutil
 
 import numpy as np
 import pyarrow as pa
 import pytest
+import yaml
 from PIL import Image
 from tiny_job import write_job
 from typer.testing import CliRunner
@@ -15,8 +17,9 @@ from pipeline.cli import app
 from pipeline.errors import JobError
 from pipeline.images import read_exr, write_exr
 from pipeline.stages import run_job, validate_job
-from queries.subpixel.description import layout
+from queries.subpixel.description import LayoutDescription, layout, shipped_layouts
 
+PAGE = pathlib.Path(__file__).parents[2] / "docs/subpixel.md"
 QUICK = {"targets": [], "layouts": ["rgb_stripe", "rgbw"]}
 
 
@@ -147,3 +150,27 @@ def test_analysis_without_tables_is_refused_before_rendering(tmp_path: pathlib.P
     job = write_job(tmp_path, record={"keep": "none", "occluded": False}, aovs={}, analysis={"subpixel": {}})
     with pytest.raises(JobError, match=r"`analysis.subpixel` filters recorded samples"):
         validate_job(job)
+
+
+# --- the page about it --------------------------------------------------------------------------------------------
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"```{kind}\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+
+
+def test_layout_of_the_page_is_the_shipped_one() -> None:
+    (text,) = blocks("yaml")
+    assert LayoutDescription.model_validate(yaml.safe_load(text)) == shipped_layouts()["rgbg"]
+
+
+def test_python_of_the_page_runs(analyzed: pathlib.Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (text,) = blocks("python")
+    exec(compile(text.replace("runs/wires", str(analyzed)), str(PAGE), "exec"), {})
+    assert "(64, 64, 3) Fit(a=1.0" in capsys.readouterr().out
+
+
+def test_options_of_the_page_exist() -> None:
+    known = CliRunner().invoke(app, ["subpixel", "--help"], terminal_width=200).output
+    for option in set(re.findall(r"--[a-z-]+", "".join(blocks("sh")))):
+        assert option in known, option

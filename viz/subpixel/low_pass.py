@@ -25,7 +25,7 @@ from viz.subpixel.look import (
     subpixel_names,
     subpixel_words,
 )
-from viz.subpixel.spectra import spectrum
+from viz.subpixel.spectra import own_spectra
 
 WIDER = 1.1  # a kernel "reaches farther" than another if it is so many times as wide
 ALIKE = 0.05  # largest difference of spectra that are "very similar"
@@ -54,7 +54,7 @@ def low_pass_figure(display: Display, description: SubpixelDescription, folder: 
     for i in shown:
         color, like = PRIMARY_COLORS[primaries[i]], [k for k in shown if k < i and layout.spacing[k] == layout.spacing[i]]
         dash = _DASHES[len(like) % len(_DASHES)]
-        frequency, magnitude = spectrum(display.kernels, i)
+        frequency, magnitude = own_spectra(display.kernels, i)
         kernel.plot(offsets[near], display.kernels.own(i)[0, near], color=color, linestyle=dash, linewidth=1.9, label=names[i])
         response.plot(frequency, magnitude[layout.active_primaries[i]], color=color, linestyle=dash, linewidth=1.9, label=names[i])
     panel_title(kernel, "Kernels")
@@ -92,7 +92,7 @@ def compared(display: Display) -> tuple[Agreement, str]:
     """How wide the kernels are, and how alike the spectra of red and blue."""
     primaries, names = letters(display.layout), subpixel_names(display.layout)
     wide = [width(display, i) for i in range(len(primaries))]
-    spectra = {letter: spectrum(display.kernels, primaries.index(letter))[1][display.layout.primaries.index(letter)] for letter in "RB"}
+    spectra = {letter: own_spectra(display.kernels, primaries.index(letter))[1][display.layout.primaries.index(letter)] for letter in "RB"}
     difference = float(np.abs(spectra["R"] - spectra["B"]).max())
     text = (
         f"Widths at half height, in pixels: {', '.join(f'{name} {value:.3g}' for name, value in zip(names, wide, strict=True))}. "

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import pyarrow as pa
 
 from queries.subpixel.analysis import Analysis, Display
+from queries.subpixel.targets import DESCRIPTIONS
 from renderer.filters.subpixel.methods import METHODS
 from viz.report.numbers import UNKNOWN, number, percent
 from viz.report.subpixel import image_title, layout_title, method_title
@@ -176,6 +177,7 @@ def settings_rows(analysis: Analysis) -> list[tuple[str, str]]:
         ("contrast sensitivity", described.sensitivity.sensitivity().name),
         ("method of the pictures", method_title(described.method)),
         ("optimal filter ends at", f"zero {described.zeros} of its sinc"),
+        *((f"test image: {image_title(name)}", DESCRIPTIONS[name]) for name in described.targets if described.evaluate),
     ]
 
 

@@ -11,6 +11,7 @@ from queries.subpixel.analysis import Display
 from queries.subpixel.description import SubpixelDescription
 from renderer.filters.subpixel.derive import Kernels
 from renderer.filters.subpixel.layout import Layout
+from renderer.filters.subpixel.spectra import Axis, fitted_spectrum, spectrum
 from viz.charts import FAINT, INK
 from viz.report.subpixel import layout_title
 from viz.subpixel.figure import Agreement, Figure
@@ -46,7 +47,6 @@ BAND_PASS = 0.05  # the share of its peak that a band-pass kernel may have at fr
 NARROW = 0.5  # of the pixel Nyquist frequency: how wide a "narrow frequency band" may be where a spectrum is at least half as high as at its peak
 LOW_AMPLITUDE = 0.5  # of a low-pass kernel at frequency 0: what the thesis, which gives no number, calls a "low amplitude" is surely not above this
 NEGLIGIBLE = 0.005  # peaks below are not looked at
-_SAMPLES = 513  # of a filter, across
 
 # What is known of differences from the thesis beyond one analysis
 STRONG_PEAKS = (
@@ -86,7 +86,7 @@ def spectra_figure(display: Display, description: SubpixelDescription, folder: p
     for subpixel, axes in zip(shown, panels.ravel(), strict=False):
         _draw_panel(axes, display, description, subpixel, [peak for peak in found if peak.subpixel == subpixel_names(layout)[subpixel]])
     label_panels(panels, len(words), "frequency (cycles per degree)", "magnitude")
-    panels[0, 0].set_xlim(0.0, min(SHOWN * nyquist, float(spectrum(display.kernels, 0)[0][-1])))
+    panels[0, 0].set_xlim(0.0, min(SHOWN * nyquist, float(own_spectra(display.kernels, 0)[0][-1])))
     analytic = [clamped_spectrum(display, description, i, np.linspace(0.0, nyquist, 101)).max() for i in shown]
     panels[0, 0].set_ylim(0.0, 1.06 * max(1.0, *(peak.magnitude for peak in found), *analytic))
     if len(layout.primaries) > 3:
@@ -119,32 +119,28 @@ def stands(layout: Layout) -> bool:
     return layout.pattern.shape[1] == 1 and layout.cells[0] == 1
 
 
-def spectrum(kernels: Kernels, subpixel: int) -> tuple[F64, F64]:
-    """Frequencies, cycles per degree (n,), and there the magnitudes of a subpixel's kernels, float64 (primaries, n).
+def own_spectra(kernels: Kernels, subpixel: int) -> tuple[F64, F64]:
+    """Frequencies, cycles per degree (n,), and there the magnitudes of a subpixel's kernels, float64 (primaries, n), along its display's axis."""
+    found = [spectrum(kernels, subpixel, primary, axis(kernels.layout)) for primary in range(len(kernels.layout.primaries))]
+    return found[0][0], np.stack([magnitude for _, magnitude in found])
 
-    They are those along rows, or down columns of displays whose subpixels stand one above the other; the frequency across them is 0.
-    """
-    down = stands(kernels.layout)
-    magnitude = np.abs(np.fft.rfft(kernels.h[subpixel].sum(axis=2 if down else 1), axis=-1))  # of kernels summed across: the section
-    return np.arange(magnitude.shape[-1]) * np.float64(kernels.step[0 if down else 1]), np.asarray(magnitude, np.float64)
+
+def axis(layout: Layout) -> Axis:
+    """Along which axis spectra are shown: rows, or columns where subpixels stand one above the other."""
+    return "down" if stands(layout) else "across"
 
 
 def clamped_spectrum(display: Display, description: SubpixelDescription, subpixel: int, frequency: F64) -> F64:
-    """The magnitude of a subpixel's clamped and normalized analytic filter at frequencies in cycles per degree, along the same direction."""
-    fit, layout = display.fits[subpixel], display.layout
-    below = fit.reconstruction_down(layout, description.zeros)
-    filter = below if below is not None and stands(layout) else fit.reconstruction(layout, description.zeros)
-    x = np.linspace(-filter.radius, filter.radius, _SAMPLES)
-    weight = filter.weight(np.hypot(x[:, None], x)).sum(axis=0) if below is None else filter.weight(x)
-    wave = np.cos(2 * np.pi * frequency[:, None] * description.viewing.degrees_per_pixel * x)
-    return np.asarray(np.abs(wave @ weight) / abs(weight.sum()), np.float64)
+    """The magnitude of a subpixel's clamped and normalized analytic filter at frequencies in cycles per degree, along the same axis."""
+    layout = display.layout
+    return fitted_spectrum(display.fits[subpixel], layout, description.viewing, frequency, description.zeros, axis(layout))
 
 
 def peaks(display: Display) -> list[Peak]:
     """The peak of each kernel, subpixel by subpixel."""
     layout, found = display.layout, []
     for subpixel, name in enumerate(subpixel_names(layout)):
-        frequency, magnitude = spectrum(display.kernels, subpixel)
+        frequency, magnitude = own_spectra(display.kernels, subpixel)
         for primary, letter in enumerate(layout.primaries):
             at = int(magnitude[primary].argmax())
             own = primary == layout.active_primaries[subpixel]
@@ -196,7 +192,7 @@ def _range(values: list[float], form: str) -> str:
 
 def _band(display: Display, peak: Peak) -> float:
     """Over how wide a band, cycles per degree, a spectrum is at least half as high as at its peak."""
-    frequency, magnitude = spectrum(display.kernels, subpixel_names(display.layout).index(peak.subpixel))
+    frequency, magnitude = own_spectra(display.kernels, subpixel_names(display.layout).index(peak.subpixel))
     along = magnitude[display.layout.primaries.index(peak.primary)]
     return float(np.count_nonzero(along >= 0.5 * along.max()) * (frequency[1] - frequency[0]))
 
@@ -204,7 +200,7 @@ def _band(display: Display, peak: Peak) -> float:
 def _draw_panel(axes: "Axes", display: Display, description: SubpixelDescription, subpixel: int, found: list[Peak]) -> None:
     """One subpixel's spectra."""
     layout, nyquist = display.layout, pixel_nyquist(description)
-    frequency, magnitude = spectrum(display.kernels, subpixel)
+    frequency, magnitude = own_spectra(display.kernels, subpixel)
     axes.axvline(nyquist, color=FAINT, linewidth=1.2, zorder=1)
     for primary, peak in enumerate(found):
         color = PRIMARY_COLORS[peak.primary]
