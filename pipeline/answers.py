@@ -26,15 +26,20 @@ def print_rows(path: pathlib.Path, text: str, format: str, time_limit: float | N
         sys.stdout.buffer.flush()
 
 
-def print_expression(path: pathlib.Path, text: str, out: pathlib.Path | None, dialect: str = "std", define: Sequence[str] = ()) -> None:
-    """Say how much light an expression selects, and write its image. ``define``: as for ``print_rows``. Raises QueryError and JobError."""
+def print_expression(
+    path: pathlib.Path, text: str, out: pathlib.Path | None, dialect: str = "std", define: Sequence[str] = (), filter: str | None = None
+) -> None:
+    """Say how much light an expression selects, and write its image, by the run's reconstruction filter or another one.
+
+    ``define``: as for ``print_rows``. Raises QueryError and JobError.
+    """
     if out is not None and out.suffix not in (".exr", ".png"):
         raise JobError(f"expected an image file that ends in .exr or .png, found `{out}`")
     with open_run(path, regions=dict(map(parse_region, define))) as run:
         expression = run.compile(text, dialect)
         for warning in expression.warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        found = select(run, {"selected": expression, "whole": None})
+        found = select(run, {"selected": expression, "whole": None}, filter=filter)
         if out is not None:
             _write_image(out, found["selected"].image, run, text)
     selected, whole = found["selected"], found["whole"]

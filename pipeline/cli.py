@@ -142,12 +142,15 @@ def lpe(
     ] = None,
     dialect: DialectOption = Dialect.std,
     define: DefineOption = None,
+    filter: Annotated[
+        str | None, typer.Option("--filter", metavar="NAME", help="Reconstruction filter of the image, such as mitchell (default: the run's).")
+    ] = None,
 ) -> None:
     """Select light by a light path expression: its share of the image, and the image itself."""
     with _clear_exit():
         from pipeline.answers import print_expression
 
-        print_expression(run, expression, out, dialect.value, define or ())
+        print_expression(run, expression, out, dialect.value, define or (), filter)
 
 
 @app.command()

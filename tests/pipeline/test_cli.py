@@ -94,6 +94,14 @@ def test_lpe_writes_an_image(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> 
 NEAR = ("--define", "near={sphere: {center: [0, 0.4, 0], radius: 1}}")
 
 
+def test_lpe_by_another_filter(tiny_run: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    for name in ("box", "mitchell"):
+        assert pathspace("lpe", tiny_run, "C D L", "--filter", name, "--out", tmp_path / f"{name}.exr").exit_code == 0
+    box, mitchell = (read_exr(tmp_path / f"{name}.exr") for name in ("box", "mitchell"))
+    assert np.abs(np.diff(mitchell, axis=0)).mean() < np.abs(np.diff(box, axis=0)).mean()
+    assert mitchell.mean() == pytest.approx(box.mean(), rel=0.02)
+
+
 def test_lpe_in_another_dialect_and_of_a_defined_region(tiny_run: pathlib.Path) -> None:
     expected = pathspace("lpe", tiny_run, "C D L")
     osl = pathspace("lpe", tiny_run, "CDL", "--dialect", "osl")
