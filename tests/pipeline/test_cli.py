@@ -42,7 +42,7 @@ def test_manifest_says_what_was_done(tiny_run: pathlib.Path) -> None:
     assert manifest["seed"] == 3
     assert stats["rendered_walks"] == 64 * 64 * 64
     assert stats["samples_per_second"] == pytest.approx(64 * 64 * 64 / stats["render_seconds"])
-    tables = {table: list((tiny_run / "tables" / table).glob("*.arrow")) for table in ("camera_vertices", "paths", "occluded")}
+    tables = {table: list((tiny_run / "tables" / table).glob("*.arrow")) for table in ("camera_vertices", "paths", "occluded", "unlit")}
     assert stats["bytes"] == sum(file.stat().st_size for files in tables.values() for file in files)
     rows = {table: sum(pa.ipc.open_file(file).read_all().num_rows for file in files) for table, files in tables.items()}
     assert stats["vertices"] == rows["camera_vertices"] > 64 * 64 * 64

@@ -47,7 +47,8 @@ def recut(
                 else:
                     inside = walk[first:end]
                     for low, high in itertools.pairwise(np.searchsorted(inside, np.arange(starts[shard], starts[shard] + per_shard + tile, tile))):
-                        writer.write_batch(part.slice(low, high - low).combine_chunks().to_batches()[0])
+                        cut = part.slice(low, high - low).combine_chunks().to_batches()
+                        writer.write_batch(cut[0] if cut else pa.RecordBatch.from_pylist([], part.schema))
             files[shard][f"tables/{name}/{shard:05d}.arrow"] = {"rows": part.num_rows, "bytes": file.stat().st_size, "xxh3": ""}
     (folder / "shards").mkdir()
     for shard, found in enumerate(files):
